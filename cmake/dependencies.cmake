@@ -1,0 +1,35 @@
+# Every dependency, and where it comes from: Debian, the pinned Python environment, or vendored source.
+find_package(Eigen3 3.4 REQUIRED NO_MODULE)
+find_package(yaml-cpp REQUIRED)
+find_package(CLI11 REQUIRED)
+find_package(Threads REQUIRED)
+find_package(PkgConfig REQUIRED)
+# find_package(Bullet) would bring the single-precision libraries.
+pkg_check_modules(BULLET REQUIRED IMPORTED_TARGET bullet-float64)
+pkg_check_modules(URDFDOM REQUIRED IMPORTED_TARGET urdfdom urdfdom_headers)
+
+file(GLOB STANCE_SITE_PACKAGES "${STANCE_VENV}/lib/python3.*/site-packages")
+if(NOT STANCE_SITE_PACKAGES)
+  message(FATAL_ERROR "no Python environment at ${STANCE_VENV}: run setup/setup.sh, or set STANCE_VENV")
+endif()
+list(APPEND CMAKE_PREFIX_PATH "${STANCE_SITE_PACKAGES}")
+find_package(lcm 1.5 CONFIG REQUIRED)
+
+# OSQP with its built-in QDLDL, static, single-threaded and deterministic.
+if(NOT STANCE_OSQP_SOURCE_DIR)
+  set(STANCE_OSQP_SOURCE_DIR "${PROJECT_SOURCE_DIR}/third_party/osqp")
+endif()
+if(NOT EXISTS "${STANCE_OSQP_SOURCE_DIR}/CMakeLists.txt")
+  message(FATAL_ERROR "no OSQP source at ${STANCE_OSQP_SOURCE_DIR}: run setup/setup.sh, or set STANCE_OSQP_SOURCE_DIR")
+endif()
+function(stance_add_osqp)
+  set(CMAKE_MESSAGE_LOG_LEVEL WARNING)
+  set(CMAKE_BUILD_TYPE Release)
+  set(FETCHCONTENT_FULLY_DISCONNECTED ON)
+  set(FETCHCONTENT_SOURCE_DIR_QDLDL "${PROJECT_SOURCE_DIR}/third_party/qdldl")
+  foreach(off OSQP_BUILD_SHARED_LIB OSQP_BUILD_DEMO_EXE OSQP_BUILD_UNITTESTS OSQP_ENABLE_PRINTING OSQP_ENABLE_INTERRUPT OSQP_ENABLE_PROFILING
+              OSQP_CODEGEN OSQP_ENABLE_DERIVATIVES OSQP_USE_LONG OSQP_USE_FLOAT)
+    set(${off} OFF CACHE BOOL "" FORCE)
+  endforeach()
+  add_subdirectory("${STANCE_OSQP_SOURCE_DIR}" "${PROJECT_BINARY_DIR}/third_party/osqp" EXCLUDE_FROM_ALL SYSTEM)
+endfunction()

@@ -1,0 +1,172 @@
+#pragma once
+// The plain structs that cross the controller's edge, one for each message of lcmtypes/: same fields, frames and units.
+// Fixed sizes, so that nothing allocates; `num_joints` and `num_contacts` say how much is in use.
+#include <array>
+#include <cstdint>
+
+#include <Eigen/Core>
+
+#include "controller/math/so3.hpp"
+
+namespace stance {
+
+inline constexpr int kMaxJoints = 8;
+inline constexpr int kMaxContacts = 4;
+inline constexpr int kStateSamples = 2;     ///< sensor samples in one RobotState
+inline constexpr int kMaxPlanStages = 32;   ///< published stages of a force plan
+inline constexpr double kControlPeriod = 0.01;  ///< s, dt of the loop and of the centroidal model
+
+using JointVector = Eigen::Matrix<double, kMaxJoints, 1>;  ///< entries past num_joints are zero
+
+/// What the sensors say over one part of a control period.
+struct SensorSample {
+  Vector3 gyro = Vector3::Zero();           ///< rad/s, in B, mean over the sample
+  Vector3 accelerometer = Vector3::Zero();  ///< m/s^2, specific force at B's origin in B, mean over the sample
+  JointVector joint_position = JointVector::Zero();  ///< rad, at the sample's end
+  JointVector joint_velocity = JointVector::Zero();  ///< rad/s, mean over the sample
+  std::array<bool, kMaxContacts> contact_switch{};   ///< at the sample's end
+};
+
+struct RobotState {
+  std::int64_t utime = 0;  ///< us, end of the last sample
+  std::int64_t seq = 0;
+  std::int64_t run_id = 0;
+  int num_joints = 0;
+  int num_contacts = 0;
+  double sample_period = 0.0;  ///< s
+  std::array<SensorSample, kStateSamples> samples{};  ///< oldest first
+  JointVector joint_torque = JointVector::Zero();     ///< N m, mean over the period
+
+  const SensorSample& now() const { return samples.back(); }
+};
+
+enum class Behaviour : std::int8_t { kStand = 0, kWalk = 1, kLieDown = 2, kTrack = 3, kCatch = 4 };
+
+struct UserCommand {
+  std::int64_t utime = 0;
+  std::int64_t seq = 0;
+  Behaviour behaviour = Behaviour::kStand;
+  Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  ///< m/s, in H
+  double yaw_rate = 0.0;                               ///< rad/s
+  double height_offset = 0.0;                          ///< m
+};
+
+enum class DriveMode : std::int8_t { kActive = 0, kDamp = 1, kStop = 2 };
+
+/// torque = feedforward_torque + kp (position - q) + kd (velocity - qd), closed by the drives.
+struct JointCommand {
+  DriveMode mode = DriveMode::kDamp;
+  int num_joints = 0;
+  JointVector feedforward_torque = JointVector::Zero();  ///< N m
+  JointVector position = JointVector::Zero();            ///< rad
+  JointVector velocity = JointVector::Zero();            ///< rad/s
+  JointVector kp = JointVector::Zero();                  ///< N m/rad
+  JointVector kd = JointVector::Zero();                  ///< N m s/rad
+};
+
+using ContactFlags = std::array<bool, kMaxContacts>;
+using ContactVectors = std::array<Vector3, kMaxContacts>;
+
+/// The forces of the QP and the path that they are predicted to give.
+struct ForcePlan {
+  int num_contacts = 0;
+  int num_stages = 0;
+  std::array<double, kMaxPlanStages> stage_duration{};           ///< s
+  std::array<ContactFlags, kMaxPlanStages> contact{};
+  ContactVectors p_WF{};                                         ///< m, where the forces of stage 0 act
+  std::array<ContactVectors, kMaxPlanStages> force{};            ///< N, of the ground on the robot, in W
+  std::array<Vector3, kMaxPlanStages> p_WC{};                    ///< m, predicted, at each stage's end
+  double effort = 0.0;                                           ///< ||f||_R of stage 0
+};
+
+enum class SafetyMode : std::int8_t { kRun = 0, kHold = 1, kDamp = 2, kStop = 3 };
+
+/// Bits of Trace::faults and indices of Trace::fault_count.
+enum class Fault : int {
+  kStateStale = 0,
+  kStateInvalid = 1,
+  kCommandInvalid = 2,
+  kQpFailed = 3,
+  kRobotFallen = 4,
+  kOperatorStop = 5,
+  kTorqueSaturated = 6,
+  kJointLimit = 7,
+};
+inline constexpr int kNumFaults = 8;
+
+enum class QpStatus : std::int8_t {
+  kNotRun = 0,
+  kSolved = 1,
+  kMaxIterations = 2,
+  kInfeasible = 3,
+  kInvalidProblem = 4,
+  kInaccurate = 5,
+};
+enum class QpEngine : std::int8_t { kOsqpCondensed = 0, kOsqpSparse = 1, kStructured = 2 };
+
+using CentroidalState = Eigen::Matrix<double, 12, 1>;  ///< (roll pitch yaw, p_WC, omega_W, v_WC)
+
+/// The base's state, estimated from the robot's own sensors.
+struct BaseEstimate {
+  Vector3 p_WB = Vector3::Zero();
+  Matrix3 R_WB = Matrix3::Identity();
+  Vector3 v_WB = Vector3::Zero();
+  Vector3 w_WB_W = Vector3::Zero();
+  Vector3 gyro_bias = Vector3::Zero();
+  Vector3 accelerometer_bias = Vector3::Zero();
+  Vector3 sigma_p = Vector3::Zero();
+  Vector3 sigma_v = Vector3::Zero();
+  Vector3 sigma_theta = Vector3::Zero();
+  ContactVectors p_WF{};    ///< foot tips
+  ContactFlags contact{};   ///< believed to bear load
+  double nis = 0.0;         ///< per degree of freedom, mean over the last step's updates
+};
+
+/// All that a tick decided; what it consumed stands beside it (loop/).
+struct Trace {
+  SafetyMode safety = SafetyMode::kRun;
+  std::uint32_t faults = 0;
+  std::array<std::int64_t, kNumFaults> fault_count{};
+  Behaviour behaviour = Behaviour::kStand;
+  BaseEstimate estimate;
+  CentroidalState x = CentroidalState::Zero();
+  CentroidalState x_ref = CentroidalState::Zero();
+  QpEngine qp_engine = QpEngine::kOsqpCondensed;
+  QpStatus qp_status = QpStatus::kNotRun;
+  int qp_iterations = 0;
+  double qp_primal_residual = 0.0;
+  double qp_dual_residual = 0.0;
+  int qp_active = 0;
+  double effort = 0.0;
+  int torques_clipped = 0;
+};
+
+/// What a tick is given. Everything that a decision may depend on is here, so that a log of it replays bit for bit.
+struct TickInput {
+  const RobotState* state = nullptr;  ///< the newest valid one, null before the first
+  bool state_is_new = false;          ///< not consumed by an earlier tick
+  bool state_is_invalid = false;      ///< a state arrived that was refused
+  int periods = 1;                    ///< control periods since the last tick
+  UserCommand user_command;           ///< the newest
+  bool user_command_is_invalid = false;
+  bool operator_stop = false;         ///< latched
+};
+
+struct TickOutput {
+  JointCommand command;
+  ForcePlan plan;
+  Trace trace;
+};
+
+/// Stages of a tick, in order: what the loop's `stamp` is told.
+enum class Stage : int { kDecode, kValidate, kEstimate, kPlan, kModel, kForceQp, kTorque, kSafety, kEncode };
+inline constexpr int kNumStages = 9;
+
+/// Called at the end of each stage; the loop supplies it, so that no module reads the clock.
+class StageClock {
+ public:
+  virtual ~StageClock() = default;
+  virtual void stamp(Stage stage) noexcept = 0;
+};
+
+}  // namespace stance
