@@ -1,0 +1,35 @@
+#pragma once
+// What robots/<robot>/ says of a robot's body: the one source of its masses, lengths, limits, joint order and feet.
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "controller/config/strict_yaml.hpp"
+#include "controller/rigid_body/model.hpp"
+
+namespace stance::config {
+
+struct RobotDescription {
+  std::string name;
+  std::string urdf_text;
+  std::string yaml_text;
+  std::vector<std::string> joint_names;   ///< the order of every joint vector
+  std::vector<std::string> foot_links;    ///< left first
+  rigid_body::Model model;
+  std::vector<rigid_body::Foot> feet;
+  JointVector nominal_joint_position = JointVector::Zero();  ///< rad
+};
+
+/// Whole text of a file. Throws ConfigError naming it where it cannot be read.
+std::string read_text(const std::filesystem::path& file);
+
+/// robots/<robot>/<robot>.yaml and the URDF that it names. Throws ConfigError.
+RobotDescription load_robot(const std::filesystem::path& robots_directory, const std::string& robot);
+
+/// The same from texts, as a log holds them. The `controller` section is left to controller_config.hpp. Throws ConfigError.
+RobotDescription robot_from_texts(const std::string& yaml_text, const std::string& urdf_text);
+
+/// Where robots/ and sim/scenarios/ are: $STANCE_SHARE, else the source tree that this was built from, else the installed share.
+std::filesystem::path share_directory();
+
+}  // namespace stance::config

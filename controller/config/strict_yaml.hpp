@@ -1,0 +1,57 @@
+#pragma once
+// YAML in which every key is asked for and no other key may stand: a typing error is an error, not a default.
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include <yaml-cpp/yaml.h>
+
+namespace stance::config {
+
+/// What is wrong with a configuration: names the file, the key, its value and the remedy.
+class ConfigError : public std::invalid_argument {
+ public:
+  using std::invalid_argument::invalid_argument;
+};
+
+/// One mapping of a YAML document. Keys are required unless read with `optional`; `finish()` refuses the keys that nobody read.
+class StrictYaml {
+ public:
+  /// Parses `text`; `name` stands in messages (a file's name). Throws ConfigError where it is no YAML mapping.
+  static StrictYaml parse(const std::string& text, const std::string& name);
+
+  bool has(const std::string& key) const;
+
+  double number(const std::string& key);
+  double number(const std::string& key, double fallback);
+  int integer(const std::string& key);
+  int integer(const std::string& key, int fallback);
+  bool boolean(const std::string& key);
+  bool boolean(const std::string& key, bool fallback);
+  std::string text(const std::string& key);
+  std::string text(const std::string& key, const std::string& fallback);
+  /// A list of numbers, exactly `size` of them where size > 0.
+  std::vector<double> numbers(const std::string& key, int size = 0);
+  std::vector<std::string> texts(const std::string& key);
+  /// A mapping below this one. The caller finishes it too.
+  StrictYaml mapping(const std::string& key);
+  /// A list of mappings; empty where the key is missing.
+  std::vector<StrictYaml> mappings(const std::string& key);
+  /// Marks a key as read without reading it: another reader takes that section.
+  void leave(const std::string& key);
+
+  /// Throws ConfigError naming the first key that nobody asked for.
+  void finish() const;
+  /// Throws ConfigError: "<file>: <path>.<key> <problem>".
+  [[noreturn]] void fail(const std::string& key, const std::string& problem) const;
+
+ private:
+  StrictYaml(YAML::Node node, std::string path);
+  YAML::Node require(const std::string& key);
+
+  YAML::Node node_;
+  std::string path_;
+  std::vector<std::string> read_;
+};
+
+}  // namespace stance::config
