@@ -46,11 +46,12 @@ class StrictYaml {
   [[noreturn]] void fail(const std::string& key, const std::string& problem) const;
 
  private:
-  StrictYaml(YAML::Node node, std::string path);
+  StrictYaml(YAML::Node node, std::string file, std::string path);
   YAML::Node require(const std::string& key);
 
   YAML::Node node_;
-  std::string path_;
+  std::string file_;
+  std::string path_;  ///< of this mapping within the file, as "controller.safety."
   std::vector<std::string> read_;
 };
 

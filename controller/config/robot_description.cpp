@@ -1,0 +1,68 @@
+#include "controller/config/robot_description.hpp"
+
+#include <cstdlib>
+#include <fstream>
+#include <sstream>
+
+namespace stance::config {
+
+std::string read_text(const std::filesystem::path& file) {
+  std::ifstream stream(file);
+  std::ostringstream text;
+  if (!stream || !(text << stream.rdbuf())) throw ConfigError("cannot read " + file.string());
+  return text.str();
+}
+
+std::filesystem::path share_directory() {
+  if (const char* directory = std::getenv("STANCE_SHARE")) return directory;
+  if (std::filesystem::exists(std::filesystem::path(STANCE_SOURCE_DIR) / "robots")) return STANCE_SOURCE_DIR;
+  return STANCE_INSTALLED_SHARE;
+}
+
+RobotDescription load_robot(const std::filesystem::path& robots_directory, const std::string& robot) {
+  const auto directory = robots_directory / robot;
+  const auto yaml_file = directory / (robot + ".yaml");
+  if (!std::filesystem::exists(yaml_file)) {
+    throw ConfigError("no robot '" + robot + "': " + yaml_file.string() + " does not exist");
+  }
+  const std::string yaml_text = read_text(yaml_file);
+  StrictYaml yaml = StrictYaml::parse(yaml_text, robot + ".yaml");
+  return robot_from_texts(yaml_text, read_text(directory / yaml.text("urdf")));
+}
+
+RobotDescription robot_from_texts(const std::string& yaml_text, const std::string& urdf_text) {
+  RobotDescription robot;
+  robot.name = StrictYaml::parse(yaml_text, "robot configuration").text("robot");
+  StrictYaml yaml = StrictYaml::parse(yaml_text, robot.name + ".yaml");
+  yaml.text("robot");
+  yaml.text("urdf");
+  robot.yaml_text = yaml_text;
+  robot.urdf_text = urdf_text;
+  robot.joint_names = yaml.texts("joints");
+  robot.foot_links = yaml.texts("feet");
+  const int num_joints = static_cast<int>(robot.joint_names.size());
+  if (num_joints > kMaxJoints) yaml.fail("joints", "has more than " + std::to_string(kMaxJoints) + " entries");
+  if (robot.foot_links.size() > static_cast<std::size_t>(kMaxContacts)) {
+    yaml.fail("feet", "has more than " + std::to_string(kMaxContacts) + " entries");
+  }
+  const auto nominal = yaml.numbers("nominal_joint_position", num_joints);
+  for (int i = 0; i < num_joints; ++i) robot.nominal_joint_position[i] = nominal[static_cast<std::size_t>(i)];
+  yaml.leave("controller");
+  yaml.leave("drives");
+  yaml.finish();
+  try {
+    robot.model = rigid_body::model_from_urdf(urdf_text, robot.joint_names);
+    robot.feet = rigid_body::feet_from_urdf(urdf_text, robot.model, robot.foot_links);
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(robot.name + " URDF: " + error.what());
+  }
+  for (int i = 0; i < num_joints; ++i) {
+    const auto& joint = robot.model.joints[static_cast<std::size_t>(i)];
+    if (robot.nominal_joint_position[i] < joint.lower || robot.nominal_joint_position[i] > joint.upper) {
+      yaml.fail("nominal_joint_position", "puts joint " + joint.name + " outside its limits");
+    }
+  }
+  return robot;
+}
+
+}  // namespace stance::config
