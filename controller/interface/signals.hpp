@@ -18,6 +18,15 @@ inline constexpr double kControlPeriod = 0.01;  ///< s, dt of the loop and of th
 
 using JointVector = Eigen::Matrix<double, kMaxJoints, 1>;  ///< entries past num_joints are zero
 
+using ContactFlags = std::array<bool, kMaxContacts>;
+using ContactVectors = std::array<Vector3, kMaxContacts>;
+/// All zero (Eigen's vectors are not, by default).
+inline ContactVectors zero_contact_vectors() {
+  ContactVectors zeros;
+  zeros.fill(Vector3::Zero());
+  return zeros;
+}
+
 /// What the sensors say over one part of a control period.
 struct SensorSample {
   Vector3 gyro = Vector3::Zero();           ///< rad/s, in B, mean over the sample
@@ -64,8 +73,6 @@ struct JointCommand {
   JointVector kd = JointVector::Zero();                  ///< N m s/rad
 };
 
-using ContactFlags = std::array<bool, kMaxContacts>;
-using ContactVectors = std::array<Vector3, kMaxContacts>;
 
 /// The forces of the QP and the path that they are predicted to give.
 struct ForcePlan {
@@ -73,10 +80,15 @@ struct ForcePlan {
   int num_stages = 0;
   std::array<double, kMaxPlanStages> stage_duration{};           ///< s
   std::array<ContactFlags, kMaxPlanStages> contact{};
-  ContactVectors p_WF{};                                         ///< m, where the forces of stage 0 act
-  std::array<ContactVectors, kMaxPlanStages> force{};            ///< N, of the ground on the robot, in W
-  std::array<Vector3, kMaxPlanStages> p_WC{};                    ///< m, predicted, at each stage's end
+  ContactVectors p_WF = zero_contact_vectors();                  ///< m, where the forces of stage 0 act
+  std::array<ContactVectors, kMaxPlanStages> force;              ///< N, of the ground on the robot, in W
+  std::array<Vector3, kMaxPlanStages> p_WC;                      ///< m, predicted, at each stage's end
   double effort = 0.0;                                           ///< ||f||_R of stage 0
+
+  ForcePlan() {
+    force.fill(zero_contact_vectors());
+    p_WC.fill(Vector3::Zero());
+  }
 };
 
 enum class SafetyMode : std::int8_t { kRun = 0, kHold = 1, kDamp = 2, kStop = 3 };
@@ -117,7 +129,7 @@ struct BaseEstimate {
   Vector3 sigma_p = Vector3::Zero();
   Vector3 sigma_v = Vector3::Zero();
   Vector3 sigma_theta = Vector3::Zero();
-  ContactVectors p_WF{};    ///< foot tips
+  ContactVectors p_WF = zero_contact_vectors();  ///< foot tips
   ContactFlags contact{};   ///< believed to bear load
   double nis = 0.0;         ///< per degree of freedom, mean over the last step's updates
 };
@@ -143,13 +155,11 @@ struct Trace {
 
 /// What a tick is given. Everything that a decision may depend on is here, so that a log of it replays bit for bit.
 struct TickInput {
-  const RobotState* state = nullptr;  ///< the newest valid one, null before the first
-  bool state_is_new = false;          ///< not consumed by an earlier tick
-  bool state_is_invalid = false;      ///< a state arrived that was refused
-  int periods = 1;                    ///< control periods since the last tick
-  UserCommand user_command;           ///< the newest
-  bool user_command_is_invalid = false;
-  bool operator_stop = false;         ///< latched
+  RobotState state;             ///< the newest, as it came: not yet validated
+  bool state_is_new = false;    ///< not given to an earlier tick
+  int periods = 1;              ///< control periods since the last tick: more than 1 after a miss
+  UserCommand user_command;     ///< the newest, as it came; seq 0 before the first
+  bool operator_stop = false;   ///< a stop_t has arrived in this run
 };
 
 struct TickOutput {

@@ -1,0 +1,210 @@
+#include "controller/io/codec.hpp"
+
+#include <algorithm>
+#include <stance_msgs/controller_timing_t.hpp>
+#include <stance_msgs/controller_trace_t.hpp>
+#include <stance_msgs/force_plan_t.hpp>
+#include <stance_msgs/joint_command_t.hpp>
+#include <stance_msgs/robot_state_t.hpp>
+#include <stance_msgs/stop_t.hpp>
+#include <stance_msgs/user_command_t.hpp>
+
+namespace stance::io {
+namespace {
+
+using stance_msgs::controller_timing_t;
+using stance_msgs::controller_trace_t;
+using stance_msgs::force_plan_t;
+using stance_msgs::joint_command_t;
+using stance_msgs::robot_state_t;
+using stance_msgs::stop_t;
+using stance_msgs::user_command_t;
+
+static_assert(robot_state_t::MAX_JOINTS == kMaxJoints && robot_state_t::MAX_CONTACTS == kMaxContacts &&
+              robot_state_t::SAMPLES == kStateSamples);
+static_assert(joint_command_t::MAX_JOINTS == kMaxJoints);
+static_assert(force_plan_t::MAX_CONTACTS == kMaxContacts && force_plan_t::MAX_STAGES == kMaxPlanStages);
+static_assert(controller_trace_t::MAX_CONTACTS == kMaxContacts && controller_trace_t::NUM_FAULTS == kNumFaults);
+static_assert(controller_timing_t::NUM_STAGES == kNumStages);
+
+/// A whole message and nothing else, or false.
+template <typename Lcm>
+bool decode_whole(Bytes bytes, Lcm& message) noexcept {
+  const auto size = static_cast<int>(bytes.size());
+  return message.decode(bytes.data(), 0, size) == size;
+}
+
+template <typename Lcm>
+void encode_whole(const Lcm& message, Message& out) noexcept {
+  const int size = message.encode(out.data.data(), 0, static_cast<int>(out.data.size()));
+  out.size = size > 0 ? static_cast<std::size_t>(size) : 0;
+}
+
+template <typename Lcm>
+void set_header(const Header& header, Lcm& message) noexcept {
+  message.utime = header.utime;
+  message.seq = header.seq;
+  message.state_seq = header.state_seq;
+  message.run_id = header.run_id;
+  std::fill(std::begin(message.tag), std::end(message.tag), std::uint8_t{0});
+}
+
+template <typename Vector, typename T>
+void copy_out(const Vector& from, T* to) noexcept {
+  for (int i = 0; i < from.size(); ++i) to[i] = from[i];
+}
+template <typename Vector, typename T>
+void copy_in(const T* from, Vector& to) noexcept {
+  for (int i = 0; i < to.size(); ++i) to[i] = from[i];
+}
+
+}  // namespace
+
+bool decode(Bytes bytes, RobotState& out) noexcept {
+  robot_state_t message{};
+  if (!decode_whole(bytes, message)) return false;
+  out.utime = message.utime;
+  out.seq = message.seq;
+  out.run_id = message.run_id;
+  out.num_joints = message.num_joints;
+  out.num_contacts = message.num_contacts;
+  out.sample_period = message.sample_period;
+  for (std::size_t s = 0; s < kStateSamples; ++s) {
+    SensorSample& sample = out.samples[s];
+    copy_in(message.gyro[s], sample.gyro);
+    copy_in(message.accelerometer[s], sample.accelerometer);
+    copy_in(message.joint_position[s], sample.joint_position);
+    copy_in(message.joint_velocity[s], sample.joint_velocity);
+    for (std::size_t c = 0; c < kMaxContacts; ++c) sample.contact_switch[c] = message.contact_switch[s][c] != 0;
+  }
+  copy_in(message.joint_torque, out.joint_torque);
+  return true;
+}
+
+bool decode(Bytes bytes, UserCommand& out) noexcept {
+  user_command_t message{};
+  if (!decode_whole(bytes, message)) return false;
+  out.utime = message.utime;
+  out.seq = message.seq;
+  out.behaviour = static_cast<Behaviour>(message.behaviour);
+  copy_in(message.velocity, out.velocity);
+  out.yaw_rate = message.yaw_rate;
+  out.height_offset = message.height_offset;
+  return true;
+}
+
+bool decode(Bytes bytes, Stop& out) noexcept {
+  stop_t message{};
+  if (!decode_whole(bytes, message)) return false;
+  out.utime = message.utime;
+  out.seq = message.seq;
+  return true;
+}
+
+bool decode(Bytes bytes, TraceKey& out) noexcept {
+  controller_trace_t message{};
+  if (!decode_whole(bytes, message)) return false;
+  out.header = {message.utime, message.seq, message.state_seq, message.run_id};
+  out.consumed = {message.state_is_new != 0, message.periods, message.user_command_seq, message.stop_seq,
+                  static_cast<std::uint64_t>(message.consumed_hash)};
+  return true;
+}
+
+void encode(const Header& header, const JointCommand& command, Message& out) noexcept {
+  joint_command_t message{};
+  set_header(header, message);
+  message.mode = static_cast<std::int8_t>(command.mode);
+  message.num_joints = command.num_joints;
+  copy_out(command.feedforward_torque, message.feedforward_torque);
+  copy_out(command.position, message.position);
+  copy_out(command.velocity, message.velocity);
+  copy_out(command.kp, message.kp);
+  copy_out(command.kd, message.kd);
+  encode_whole(message, out);
+}
+
+void encode(const Header& header, const ForcePlan& plan, Message& out) noexcept {
+  force_plan_t message{};
+  set_header(header, message);
+  message.num_contacts = plan.num_contacts;
+  message.num_stages = plan.num_stages;
+  for (std::size_t k = 0; k < kMaxPlanStages; ++k) {
+    message.stage_duration[k] = plan.stage_duration[k];
+    copy_out(plan.p_WC[k], message.p_WC[k]);
+    for (std::size_t c = 0; c < kMaxContacts; ++c) {
+      message.contact[k][c] = plan.contact[k][c] ? 1 : 0;
+      copy_out(plan.force[k][c], message.force[k][c]);
+    }
+  }
+  for (std::size_t c = 0; c < kMaxContacts; ++c) copy_out(plan.p_WF[c], message.p_WF[c]);
+  message.effort = plan.effort;
+  encode_whole(message, out);
+}
+
+void encode(const Header& header, const Consumed& consumed, const Trace& trace, Message& out) noexcept {
+  controller_trace_t message{};
+  set_header(header, message);
+  message.state_is_new = consumed.state_is_new ? 1 : 0;
+  message.periods = consumed.periods;
+  message.user_command_seq = consumed.user_command_seq;
+  message.stop_seq = consumed.stop_seq;
+  message.consumed_hash = static_cast<std::int64_t>(consumed.hash);
+  message.safety = static_cast<std::int8_t>(trace.safety);
+  message.faults = static_cast<std::int32_t>(trace.faults);
+  std::copy(trace.fault_count.begin(), trace.fault_count.end(), message.fault_count);
+  message.behaviour = static_cast<std::int8_t>(trace.behaviour);
+  const BaseEstimate& estimate = trace.estimate;
+  copy_out(estimate.p_WB, message.p_WB);
+  const Quaternion quat(estimate.R_WB);
+  message.quat_WB[0] = quat.w();
+  message.quat_WB[1] = quat.x();
+  message.quat_WB[2] = quat.y();
+  message.quat_WB[3] = quat.z();
+  copy_out(estimate.v_WB, message.v_WB);
+  copy_out(estimate.w_WB_W, message.w_WB_W);
+  copy_out(estimate.gyro_bias, message.gyro_bias);
+  copy_out(estimate.accelerometer_bias, message.accelerometer_bias);
+  copy_out(estimate.sigma_p, message.sigma_p);
+  copy_out(estimate.sigma_v, message.sigma_v);
+  copy_out(estimate.sigma_theta, message.sigma_theta);
+  for (std::size_t c = 0; c < kMaxContacts; ++c) {
+    copy_out(estimate.p_WF[c], message.p_WF[c]);
+    message.contact[c] = estimate.contact[c] ? 1 : 0;
+  }
+  message.nis = estimate.nis;
+  copy_out(trace.x, message.x);
+  copy_out(trace.x_ref, message.x_ref);
+  message.qp_engine = static_cast<std::int8_t>(trace.qp_engine);
+  message.qp_status = static_cast<std::int8_t>(trace.qp_status);
+  message.qp_iterations = trace.qp_iterations;
+  message.qp_primal_residual = trace.qp_primal_residual;
+  message.qp_dual_residual = trace.qp_dual_residual;
+  message.qp_active = trace.qp_active;
+  message.effort = trace.effort;
+  message.torques_clipped = trace.torques_clipped;
+  encode_whole(message, out);
+}
+
+void encode(const Header& header, const Timing& timing, Message& out) noexcept {
+  controller_timing_t message{};
+  set_header(header, message);
+  message.utime = timing.start_utime;
+  std::copy(timing.stage_us.begin(), timing.stage_us.end(), message.stage_us);
+  message.tick_us = timing.tick_us;
+  message.cpu_us = timing.cpu_us;
+  message.period_us = timing.period_us;
+  message.wake_latency_us = timing.wake_latency_us;
+  message.slack_us = timing.slack_us;
+  message.state_age_us = timing.state_age_us;
+  message.missed_ticks = timing.missed_ticks;
+  message.dropped_states = timing.dropped_states;
+  encode_whole(message, out);
+}
+
+std::uint64_t hash(Bytes bytes, std::uint64_t seed) noexcept {
+  std::uint64_t value = seed;
+  for (const std::uint8_t byte : bytes) value = (value ^ byte) * 1099511628211ULL;
+  return value;
+}
+
+}  // namespace stance::io

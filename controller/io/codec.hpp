@@ -1,0 +1,92 @@
+#pragma once
+// LCM bytes to structs and back: pure functions, no socket, no allocation. This folder alone includes LCM.
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "controller/interface/signals.hpp"
+
+namespace stance::io {
+
+using Bytes = std::span<const std::uint8_t>;
+
+/// Channels, the same for every robot.
+namespace channel {
+inline constexpr const char* kRobotState = "ROBOT_STATE";
+inline constexpr const char* kUserCommand = "USER_COMMAND";
+inline constexpr const char* kStop = "STOP";
+inline constexpr const char* kJointCommand = "JOINT_COMMAND";
+inline constexpr const char* kForcePlan = "FORCE_PLAN";
+inline constexpr const char* kTrace = "CONTROLLER_TRACE";
+inline constexpr const char* kTiming = "CONTROLLER_TIMING";
+inline constexpr const char* kRunInfo = "RUN_INFO_CONTROLLER";
+}  // namespace channel
+
+/// Which message this is and what it answers.
+struct Header {
+  std::int64_t utime = 0;      ///< us, the consumed state's stamp and the periods since
+  std::int64_t seq = 0;        ///< the tick
+  std::int64_t state_seq = 0;  ///< 0 before the first state
+  std::int64_t run_id = 0;     ///< the consumed state's
+};
+
+/// What a tick consumed, for the trace: with these a log replays.
+struct Consumed {
+  bool state_is_new = false;
+  int periods = 1;
+  std::int64_t user_command_seq = 0;
+  std::int64_t stop_seq = 0;
+  std::uint64_t hash = 0;  ///< FNV-1a of the consumed bytes
+};
+
+/// What the wall clock says of a tick.
+struct Timing {
+  std::array<double, kNumStages> stage_us{};
+  double tick_us = 0.0;
+  double cpu_us = 0.0;
+  double period_us = 0.0;
+  double wake_latency_us = 0.0;
+  double slack_us = 0.0;
+  double state_age_us = 0.0;
+  std::int64_t start_utime = 0;  ///< us, monotonic
+  std::int64_t missed_ticks = 0;
+  std::int64_t dropped_states = 0;
+};
+
+/// Identity of an operator's stop.
+struct Stop {
+  std::int64_t utime = 0;
+  std::int64_t seq = 0;
+};
+
+// Decoders return false, and leave `out` alone, where the bytes are not a whole message of the type.
+[[nodiscard]] bool decode(Bytes bytes, RobotState& out) noexcept;
+[[nodiscard]] bool decode(Bytes bytes, UserCommand& out) noexcept;
+[[nodiscard]] bool decode(Bytes bytes, Stop& out) noexcept;
+/// The trace's record of what its tick consumed, for replay.
+struct TraceKey {
+  Header header;
+  Consumed consumed;
+};
+[[nodiscard]] bool decode(Bytes bytes, TraceKey& out) noexcept;
+
+/// Room for the largest message that the controller publishes.
+inline constexpr std::size_t kMaxMessageBytes = 8192;
+/// An encoded message in memory of its own.
+struct Message {
+  std::array<std::uint8_t, kMaxMessageBytes> data{};
+  std::size_t size = 0;
+  Bytes bytes() const { return {data.data(), size}; }
+};
+
+void encode(const Header& header, const JointCommand& command, Message& out) noexcept;
+void encode(const Header& header, const ForcePlan& plan, Message& out) noexcept;
+void encode(const Header& header, const Consumed& consumed, const Trace& trace, Message& out) noexcept;
+void encode(const Header& header, const Timing& timing, Message& out) noexcept;
+
+/// FNV-1a, 64 bit; start from kHashSeed and chain.
+inline constexpr std::uint64_t kHashSeed = 14695981039346656037ULL;
+std::uint64_t hash(Bytes bytes, std::uint64_t seed = kHashSeed) noexcept;
+
+}  // namespace stance::io
