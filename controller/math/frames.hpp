@@ -10,7 +10,8 @@
 //   K   camera         A   base of an arm
 //
 //   p_WC    position of C from W's origin, expressed in W          [m]
-//   p_BF_W  position of F from B's origin, expressed in W          [m]  (a third letter gives the axes where they differ)
+//   p_BF_W  position of F from B's origin, expressed in W          [m]
+//           (a last letter gives the axes where they are not the first letter's)
 //   R_WB    rotation that takes components in B to components in W
 //   T_WB    rigid transform (R_WB, p_WB)
 //   v_WB    velocity of B's origin in W, in W                      [m/s]

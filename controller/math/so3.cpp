@@ -4,6 +4,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "controller/math/rodrigues.hpp"
+
 namespace stance::math {
 
 Matrix3 skew(const Vector3& v) noexcept {
@@ -13,14 +15,9 @@ Matrix3 skew(const Vector3& v) noexcept {
 }
 
 Matrix3 exp_so3(const Vector3& v) noexcept {
-  const double angle2 = v.squaredNorm();
-  const double angle = std::sqrt(angle2);
-  // sin(a)/a and (1 - cos a)/a^2, by series where the quotients lose digits.
-  const double a = angle2 < 1e-6 ? 1.0 - angle2 / 6.0 * (1.0 - angle2 / 20.0) : std::sin(angle) / angle;
-  const double half = 0.5 * angle;
-  const double b = angle2 < 1e-6 ? 0.5 - angle2 / 24.0 * (1.0 - angle2 / 30.0) : 2.0 * std::sin(half) * std::sin(half) / angle2;
+  const Rodrigues k = rodrigues(v.squaredNorm());
   const Matrix3 K = skew(v);
-  return Matrix3::Identity() + a * K + b * K * K;
+  return Matrix3::Identity() + k.a * K + k.b * K * K;
 }
 
 Vector3 log_so3(const Matrix3& R) noexcept {
