@@ -1,6 +1,6 @@
 #pragma once
-// A robot as a tree of rigid bodies, read from URDF. Body 0 is the base; body i (i >= 1) hangs on joint i-1, and joints stand
-// in the order that the caller names, which must put a parent before its children.
+// A robot as a tree of rigid bodies, read from URDF. Body 0 is the base; body i (i >= 1) hangs on joint i-1, and joints
+// stand in the order that the caller names, which must put a parent before its children.
 #include <array>
 #include <string>
 #include <vector>
@@ -14,49 +14,51 @@ inline constexpr int kMaxBodies = kMaxJoints + 1;
 /// One rigid body, in its own link frame (URDF's: at the joint, for the base B).
 struct Body {
   std::string name;
-  double mass = 0.0;                      ///< kg
-  Vector3 com = Vector3::Zero();          ///< m, centre of mass in the link frame
-  Matrix3 inertia = Matrix3::Zero();      ///< kg m^2, about the centre of mass, axes of the link frame
+  double mass = 0.0;                  ///< kg
+  Vector3 com = Vector3::Zero();      ///< m, centre of mass in the link frame
+  Matrix3 inertia = Matrix3::Zero();  ///< kg m^2, about the centre of mass, axes of the link frame
 };
 
 /// A revolute joint: T_parent_child(q) = (R_PJ exp([axis] q), p_PJ).
 struct Joint {
   std::string name;
-  int parent = 0;                         ///< body index
-  Matrix3 R_PJ = Matrix3::Identity();     ///< child's link frame at q = 0 in the parent's link frame
-  Vector3 p_PJ = Vector3::Zero();         ///< m
-  Vector3 axis = Vector3::UnitZ();        ///< unit vector in the child's link frame
-  double lower = 0.0;                     ///< rad
-  double upper = 0.0;                     ///< rad
-  double max_velocity = 0.0;              ///< rad/s
-  double max_torque = 0.0;                ///< N m
+  int parent = 0;                      ///< body index
+  Matrix3 R_PJ = Matrix3::Identity();  ///< child's link frame at q = 0 in the parent's link frame
+  Vector3 p_PJ = Vector3::Zero();      ///< m
+  Vector3 axis = Vector3::UnitZ();     ///< unit vector in the child's link frame
+  double lower = 0.0;                  ///< rad
+  double upper = 0.0;                  ///< rad
+  double max_velocity = 0.0;           ///< rad/s
+  double max_torque = 0.0;             ///< N m
 };
 
 /// A spherical contact (point foot): the first sphere collision shape of a leaf body.
 struct Foot {
-  int body = 0;                           ///< body index
-  Vector3 tip = Vector3::Zero();          ///< m, the sphere's centre in the link frame
-  double radius = 0.0;                    ///< m
+  int body = 0;                   ///< body index
+  Vector3 tip = Vector3::Zero();  ///< m, the sphere's centre in the link frame
+  double radius = 0.0;            ///< m
 };
 
 struct Model {
   std::string name;
   int num_joints = 0;
-  std::array<Body, kMaxBodies> bodies;    ///< num_joints + 1 in use
-  std::array<Joint, kMaxJoints> joints;   ///< joint i carries body i + 1
-  double total_mass = 0.0;                ///< kg
+  std::array<Body, kMaxBodies> bodies;   ///< num_joints + 1 in use
+  std::array<Joint, kMaxJoints> joints;  ///< joint i carries body i + 1
+  double total_mass = 0.0;               ///< kg
 
   int num_bodies() const { return num_joints + 1; }
   int body_index(const std::string& name) const;  ///< throws std::invalid_argument that names the link
 };
 
 /// Reads URDF text. Fixed joints are merged into their parents. `joint_order` names every moving joint once.
-/// Throws std::invalid_argument, naming the element and the remedy, for: malformed XML, a joint that is missing from or unknown
-/// to the order, a child before its parent, a joint type other than revolute and fixed, a non-positive mass, an inertia that is
-/// not positive definite, missing limits, more than kMaxJoints joints.
+/// Throws std::invalid_argument, naming the element and the remedy, for: malformed XML, a joint that is missing from or
+/// unknown to the order, a child before its parent, a joint type other than revolute and fixed, a non-positive mass, an
+/// inertia that is not positive definite, missing limits, more than kMaxJoints joints.
 Model model_from_urdf(const std::string& urdf_text, const std::vector<std::string>& joint_order);
 
-/// The point feet named by `links`, in that order. Throws std::invalid_argument where a link has no sphere collision shape.
-std::vector<Foot> feet_from_urdf(const std::string& urdf_text, const Model& model, const std::vector<std::string>& links);
+/// The point feet named by `links`, in that order. Throws std::invalid_argument where a link has no sphere collision
+/// shape.
+std::vector<Foot> feet_from_urdf(const std::string& urdf_text, const Model& model,
+                                 const std::vector<std::string>& links);
 
 }  // namespace stance::rigid_body
