@@ -1,0 +1,267 @@
+// The base estimator's law, one sample after the other. State, maps and Jacobians: base_error_state.hpp.
+//
+//   contact     = contact switch and planned stance
+//   trust alpha = min(1, time in contact / contact_ramp, load)
+//   1. predict  state and P; a foot in contact rolls: f += u dt
+//   2. gate     a foot in contact slips where its velocity's NIS > slip_gate, before any update: its velocity is
+//   skipped, its
+//               time in contact starts again. A foot refused for slip_timeout is believed, its variance times
+//               slip_inflation.
+//   3. feet     not in contact or slipping: f = p + R c anew, its covariance with it, plus swing_foot_noise^2 dt;
+//               others: plus (stance_foot_noise + unloading_foot_noise (1 - alpha))^2 dt
+//   4. update   each foot in contact: velocity (unless it slips), position; variances times 1 + ramp_gain (1 - alpha)
+//
+// Gating the velocity alone would not do: a slipping foot's position drags velocity and tilt with it, hence step 3 for
+// it too.
+//
+// At the start the accelerometer gives the tilt, so that its bias and the tilt's error are one: theta = z x (R b_a)/g +
+// own error. P starts with that correlation; without it the filter would count the accelerometer twice.
+#include "controller/estimation/base_estimator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <sstream>
+#include <stdexcept>
+
+namespace stance::estimation {
+namespace {
+
+constexpr double kMicrosecond = 1e-6;  ///< s
+
+double squared(double x) { return x * x; }
+
+ImuMean imu_mean(const SensorSample& sample, double dt) { return {sample.gyro, sample.accelerometer, dt}; }
+
+/// The rotation next to R, for an R that rounding alone has moved (one Newton step).
+Matrix3 orthonormal(const Matrix3& R) { return 1.5 * R - 0.5 * R * R.transpose() * R; }
+
+Vector3 sigma(const ErrorMatrix& P, int begin) { return P.diagonal().segment<3>(begin).cwiseMax(0.0).cwiseSqrt(); }
+
+}  // namespace
+
+void BaseEstimatorConfig::validate() const {
+  struct Field {
+    const char* name;
+    double value;
+    double low;
+    double high;
+  };
+  constexpr double kTiny = 1e-9;  // what a variance is divided by must not vanish
+  const Field fields[] = {
+      {"gyro_noise", gyro_noise, 0.0, 1.0},
+      {"accelerometer_noise", accelerometer_noise, kTiny, 10.0},
+      {"position_noise", position_noise, 0.0, 1.0},
+      {"gyro_bias_noise", gyro_bias_noise, 0.0, 1.0},
+      {"accelerometer_bias_noise", accelerometer_bias_noise, 0.0, 1.0},
+      {"stance_foot_noise", stance_foot_noise, 0.0, 1.0},
+      {"unloading_foot_noise", unloading_foot_noise, 0.0, 10.0},
+      {"swing_foot_noise", swing_foot_noise, 0.1, 1000.0},
+      {"foot_velocity_sigma", foot_velocity_sigma, 1e-5, 10.0},
+      {"foot_position_sigma", foot_position_sigma, 1e-6, 1.0},
+      {"contact_ramp", contact_ramp, kTiny, 1.0},
+      {"ramp_gain", ramp_gain, 0.0, 1e4},
+      {"slip_gate", slip_gate, 3.0, 1e6},
+      {"slip_timeout", slip_timeout, 0.0, 10.0},
+      {"slip_inflation", slip_inflation, 1.0, 1e6},
+      {"initial_tilt_sigma", initial_tilt_sigma, 0.0, 1.0},
+      {"initial_yaw_sigma", initial_yaw_sigma, 0.0, 1.0},
+      {"initial_velocity_sigma", initial_velocity_sigma, 0.0, 10.0},
+      {"initial_position_sigma", initial_position_sigma, 0.0, 10.0},
+      {"initial_foot_sigma", initial_foot_sigma, 0.0, 10.0},
+      {"initial_gyro_bias_sigma", initial_gyro_bias_sigma, 0.0, 1.0},
+      {"initial_accelerometer_bias_sigma", initial_accelerometer_bias_sigma, 0.0, 10.0},
+  };
+  for (const Field& field : fields) {
+    if (field.value >= field.low && field.value <= field.high) continue;
+    std::ostringstream message;
+    message << "base estimator: " << field.name << " = " << field.value << " is not within [" << field.low << ", "
+            << field.high << "]";
+    throw std::invalid_argument(message.str());
+  }
+}
+
+BaseEstimator::BaseEstimator(const BaseEstimatorConfig& config, const std::array<kinematics::LegGeometry, kFeet>& legs,
+                             double foot_radius)
+    : config_(config), legs_(legs), foot_radius_(foot_radius) {
+  config_.validate();
+}
+
+void BaseEstimator::initialise(const RobotState& state) noexcept {
+  Vector3 mean_accelerometer = Vector3::Zero();
+  for (const SensorSample& sample : state.samples) mean_accelerometer += sample.accelerometer / kStateSamples;
+  const SensorSample& now = state.now();
+
+  state_ = BaseState{};
+  const double roll = std::atan2(mean_accelerometer.y(), mean_accelerometer.z());
+  const double pitch = std::atan2(-mean_accelerometer.x(), std::hypot(mean_accelerometer.y(), mean_accelerometer.z()));
+  state_.R_WB = math::rotation_from_rpy({roll, pitch, 0.0});
+
+  const bool any_on = now.contact_switch[0] || now.contact_switch[1];
+  Vector3 origin = Vector3::Zero();  // W's, from B's origin, with the axes of W
+  int on_ground = 0;
+  for (int i = 0; i < kFeet; ++i) {
+    state_.p_WF[i] = state_.R_WB * measure_foot(now, i, 0.0).p_BF;
+    origin.head<2>() += state_.p_WF[i].head<2>() / kFeet;
+    if (any_on && !now.contact_switch[i]) continue;
+    origin.z() += state_.p_WF[i].z() - foot_radius_;
+    ++on_ground;
+  }
+  origin.z() /= on_ground;
+  state_.p_WB = -origin;
+  for (Vector3& p_WF : state_.p_WF) p_WF -= origin;
+
+  const BaseEstimatorConfig& c = config_;
+  ErrorVector sigma0;
+  sigma0 << c.initial_tilt_sigma, c.initial_tilt_sigma, c.initial_yaw_sigma,
+      Vector3::Constant(c.initial_velocity_sigma), Vector3::Constant(c.initial_position_sigma),
+      Vector3::Constant(c.initial_foot_sigma), Vector3::Constant(c.initial_foot_sigma),
+      Vector3::Constant(c.initial_gyro_bias_sigma), Vector3::Constant(c.initial_accelerometer_bias_sigma);
+  filter_.x.setZero();
+  filter_.P = sigma0.cwiseAbs2().asDiagonal();
+  const Matrix3 tilt_by_bias = math::skew(Vector3::UnitZ()) * state_.R_WB / kGravity;
+  const double bias_variance = squared(c.initial_accelerometer_bias_sigma);
+  filter_.P.block<3, 3>(kTheta, kTheta) += bias_variance * tilt_by_bias * tilt_by_bias.transpose();
+  filter_.P.block<3, 3>(kTheta, kAccelerometerBias) = bias_variance * tilt_by_bias;
+  filter_.P.block<3, 3>(kAccelerometerBias, kTheta) = bias_variance * tilt_by_bias.transpose();
+
+  contact_time_.fill(c.contact_ramp);
+  rejected_time_.fill(0.0);
+  in_contact_.fill(false);
+  slipping_.fill(false);
+  utime_ = state.utime - std::llround(kStateSamples * state.sample_period / kMicrosecond);
+  initialised_ = true;
+}
+
+void BaseEstimator::step(const RobotState& state, const ContactPlan& plan, BaseEstimate& estimate) noexcept {
+  if (!initialised_) initialise(state);
+  nis_sum_ = 0.0;
+  updates_ = 0;
+  const double dt = state.sample_period;
+  const double gap = kMicrosecond * static_cast<double>(state.utime - utime_) - kStateSamples * dt;
+  const ImuMean oldest = imu_mean(state.samples.front(), dt);
+  for (int lost = 0; lost < kMaxBridgedSamples && (lost + 0.5) * dt < gap; ++lost) advance(oldest);
+  for (const SensorSample& sample : state.samples) step_sample(sample, dt, plan);
+  state_.R_WB = orthonormal(state_.R_WB);
+  utime_ = state.utime;
+  write(state.now(), estimate);
+}
+
+FootMeasurement BaseEstimator::measure_foot(const SensorSample& sample, int foot, double dt) const noexcept {
+  const kinematics::LegVector q = sample.joint_position.segment<4>(4 * foot);
+  const kinematics::LegVector qd = sample.joint_velocity.segment<4>(4 * foot);
+  const kinematics::LegVector q_mid = q - 0.5 * dt * qd;
+  FootMeasurement result;
+  Eigen::Matrix<double, 3, 4> J_BF;
+  kinematics::foot_in_base(legs_[foot], q, result.p_BF, J_BF);
+  kinematics::foot_in_base(legs_[foot], q_mid, result.p_BF_mid, J_BF);
+  result.v_BF = J_BF * qd;
+  const double pitch_rate = qd[1] + qd[2] + qd[3];
+  const Vector3 w_LF(qd[0], -std::sin(q_mid[0]) * pitch_rate, std::cos(q_mid[0]) * pitch_rate);
+  result.w_BF = kinematics::leg_rotation() * w_LF;
+  return result;
+}
+
+void BaseEstimator::advance(const ImuMean& imu) noexcept {
+  const BaseEstimatorConfig& c = config_;
+  const Transition transition = predict(state_, imu);
+  ErrorVector q = ErrorVector::Zero();
+  q.segment<3>(kTheta).setConstant(squared(c.gyro_noise) * imu.dt);
+  q.segment<3>(kVelocity).setConstant(squared(c.accelerometer_noise) * imu.dt);
+  q.segment<3>(kPosition).setConstant(squared(c.position_noise) * imu.dt);
+  q.segment<3>(kGyroBias).setConstant(squared(c.gyro_bias_noise) * imu.dt);
+  q.segment<3>(kAccelerometerBias).setConstant(squared(c.accelerometer_bias_noise) * imu.dt);
+  filter_.predict_covariance([&transition](ErrorMatrix& M) { transition.multiply(M); }, q);
+}
+
+void BaseEstimator::step_sample(const SensorSample& sample, double dt, const ContactPlan& plan) noexcept {
+  const BaseEstimatorConfig& c = config_;
+  const ImuMean imu = imu_mean(sample, dt);
+  advance(imu);
+
+  std::array<FootMeasurement, kFeet> feet;
+  for (int i = 0; i < kFeet; ++i) {
+    feet[i] = measure_foot(sample, i, dt);
+    in_contact_[i] = sample.contact_switch[i] && plan.stance[i];
+    contact_time_[i] = in_contact_[i] ? contact_time_[i] + dt : 0.0;
+    if (in_contact_[i]) state_.p_WF[i] += dt * rolling_velocity(state_, imu, feet[i], foot_radius_);
+  }
+
+  // Both gates before any update and any clone: each foot is judged by the prediction alone.
+  for (int i = 0; i < kFeet; ++i) gate(imu, feet[i], i);
+
+  std::array<double, kFeet> variance_scale;
+  for (int i = 0; i < kFeet; ++i) {
+    const double trust =
+        in_contact_[i] ? std::clamp(std::min(contact_time_[i] / c.contact_ramp, plan.load[i]), 0.0, 1.0) : 0.0;
+    variance_scale[i] = 1.0 + c.ramp_gain * (1.0 - trust);
+    if (in_contact_[i] && !slipping_[i]) {
+      const double noise = c.stance_foot_noise + c.unloading_foot_noise * (1.0 - trust);
+      filter_.P.diagonal().segment<3>(foot_index(i)).array() += squared(noise) * dt;
+    } else {
+      state_.p_WF[i] = state_.p_WB + state_.R_WB * feet[i].p_BF;
+      ErrorVector q = ErrorVector::Zero();
+      q.segment<3>(foot_index(i)).setConstant(squared(c.swing_foot_noise) * dt);
+      filter_.predict_covariance([&](ErrorMatrix& M) { multiply_by_clone(state_, feet[i], i, M); }, q);
+    }
+  }
+
+  for (int i = 0; i < kFeet; ++i) {
+    if (!in_contact_[i]) continue;
+    if (!slipping_[i]) {
+      const double late = rejected_time_[i] >= c.slip_timeout ? c.slip_inflation : 1.0;
+      update(velocity_measurement(state_, imu, feet[i], foot_radius_),
+             late * squared(c.foot_velocity_sigma) * variance_scale[i]);
+    }
+    update(position_measurement(state_, feet[i], i), squared(c.foot_position_sigma) * variance_scale[i]);
+  }
+
+  // A swing foot's tip is where the corrected base puts it.
+  for (int i = 0; i < kFeet; ++i) {
+    if (!in_contact_[i]) state_.p_WF[i] = state_.p_WB + state_.R_WB * feet[i].p_BF;
+  }
+}
+
+void BaseEstimator::gate(const ImuMean& imu, const FootMeasurement& foot, int index) noexcept {
+  slipping_[index] = false;
+  double& rejected_time = rejected_time_[index];
+  if (!in_contact_[index]) {
+    rejected_time = 0.0;
+    return;
+  }
+  const ErrorMeasurement velocity = velocity_measurement(state_, imu, foot, foot_radius_);
+  const Matrix3 R = squared(config_.foot_velocity_sigma) * Matrix3::Identity();
+  if (filter_.innovation(velocity.z, velocity.H, R).nis <= config_.slip_gate) {
+    rejected_time = std::max(0.0, rejected_time - imu.dt);
+  } else if (rejected_time < config_.slip_timeout) {
+    slipping_[index] = true;
+    rejected_time += imu.dt;
+    contact_time_[index] = 0.0;
+  }
+}
+
+void BaseEstimator::update(const ErrorMeasurement& measurement, double variance) noexcept {
+  const auto innovation = filter_.update(measurement.z, measurement.H, variance * Matrix3::Identity());
+  state_ = plus(state_, filter_.x);
+  filter_.x.setZero();
+  nis_sum_ += innovation.nis;
+  ++updates_;
+}
+
+void BaseEstimator::write(const SensorSample& now, BaseEstimate& estimate) const noexcept {
+  estimate.p_WB = state_.p_WB;
+  estimate.R_WB = state_.R_WB;
+  estimate.v_WB = state_.v_WB;
+  estimate.w_WB_W = state_.R_WB * (now.gyro - state_.gyro_bias);
+  estimate.gyro_bias = state_.gyro_bias;
+  estimate.accelerometer_bias = state_.accelerometer_bias;
+  estimate.sigma_p = sigma(filter_.P, kPosition);
+  estimate.sigma_v = sigma(filter_.P, kVelocity);
+  estimate.sigma_theta = sigma(filter_.P, kTheta);
+  for (int i = 0; i < kFeet; ++i) {
+    estimate.p_WF[i] = state_.p_WF[i];
+    estimate.contact[i] = in_contact_[i];
+  }
+  estimate.nis = updates_ > 0 ? nis_sum_ / (3 * updates_) : 0.0;
+}
+
+}  // namespace stance::estimation

@@ -1,0 +1,172 @@
+#include "tests/estimation/simulated_robot.hpp"
+
+#include <cmath>
+#include <stdexcept>
+
+namespace stance::estimation::test {
+namespace {
+
+constexpr int kSubsteps = 10;
+constexpr int kImuSamples = 5;  // of a 1 kHz IMU in one sample
+
+Vector3 gravity_W() { return {0.0, 0.0, -kGravity}; }
+
+}  // namespace
+
+BaseEstimatorConfig recommended_config() {
+  BaseEstimatorConfig c;
+  c.gyro_noise = 2e-4;
+  c.accelerometer_noise = 2e-2;
+  c.position_noise = 1e-4;
+  c.gyro_bias_noise = 2e-5;
+  c.accelerometer_bias_noise = 2e-4;
+  c.stance_foot_noise = 3e-3;
+  c.unloading_foot_noise = 0.1;
+  c.swing_foot_noise = 10.0;
+  c.foot_velocity_sigma = 0.02;
+  c.foot_position_sigma = 4e-4;
+  c.contact_ramp = 0.02;
+  c.ramp_gain = 20.0;
+  c.slip_gate = 14.0;
+  c.slip_timeout = 0.15;
+  c.slip_inflation = 100.0;
+  c.initial_tilt_sigma = 6e-3;
+  c.initial_yaw_sigma = 1e-4;
+  c.initial_velocity_sigma = 0.05;
+  c.initial_position_sigma = 1e-4;
+  c.initial_foot_sigma = 3e-3;
+  c.initial_gyro_bias_sigma = 3e-3;
+  c.initial_accelerometer_bias_sigma = 0.05;
+  return c;
+}
+
+std::array<kinematics::LegGeometry, kFeet> test_legs() {
+  kinematics::LegGeometry leg;
+  leg.length = {0.08, 0.26, 0.26, 0.24};
+  leg.com_offset = {0.04, 0.104, 0.104, 0.108};
+  leg.p_BL = {0.0, 0.1, -0.1};
+  std::array<kinematics::LegGeometry, kFeet> legs{leg, leg};
+  legs[1].p_BL.y() = -leg.p_BL.y();
+  return legs;
+}
+
+Motion standing_motion() {
+  Motion motion;
+  motion.p_WB = [](double t) {
+    return Vector3(0.02 * (1.0 - std::cos(2.1 * t)), 0.03 * (1.0 - std::cos(1.3 * t)), 0.80 + 0.01 * (1.0 - std::cos(3.0 * t)));
+  };
+  motion.rpy = [](double t) {
+    return Vector3(0.03 * (1.0 - std::cos(1.7 * t)), 0.05 * (1.0 - std::cos(2.6 * t)), 0.04 * (1.0 - std::cos(0.9 * t)));
+  };
+  return motion;
+}
+
+SensorErrors consumer_sensors() {
+  SensorErrors e;
+  e.gyro_noise = 0.003;
+  e.gyro_bias = 0.002;
+  e.gyro_bias_walk = 2e-5;
+  e.accelerometer_noise = 0.05;
+  e.accelerometer_bias = 0.05;
+  e.encoder_step = 5e-4;
+  e.encoder_offset = 2e-3;
+  e.joint_velocity_noise = 0.05;
+  return e;
+}
+
+SimulatedRobot::SimulatedRobot(Motion motion, const SensorErrors& errors, std::uint32_t seed)
+    : motion_(std::move(motion)), errors_(errors), random_(seed) {
+  const Vector3 p_WB = motion_.p_WB(0.0);
+  const Vector3 heading_offset(0.0, legs_[0].p_BL.y(), 0.0);
+  truth_.p_WF = {Vector3(p_WB.x(), p_WB.y(), kFootRadius) + heading_offset,
+                 Vector3(p_WB.x(), p_WB.y(), kFootRadius) - heading_offset};
+  truth_.p_WB = p_WB;
+  truth_.R_WB = R_WB(0.0);
+  truth_.v_WB = v_WB(0.0);
+  truth_.gyro_bias = errors_.gyro_bias * Vector3(sign(), sign(), sign());
+  truth_.accelerometer_bias = errors_.accelerometer_bias * Vector3(sign(), sign(), sign());
+  for (double& offset : encoder_offset_) offset = errors_.encoder_offset * sign();
+  q_ = joints(0.0, truth_.p_WF);
+  state_.num_joints = kMaxJoints;
+  state_.num_contacts = kFeet;
+  state_.sample_period = kSamplePeriod;
+}
+
+const RobotState& SimulatedRobot::next() {
+  for (SensorSample& sample : state_.samples) measure(sample);
+  state_.utime += std::llround(1e6 * kStateSamples * kSamplePeriod);
+  ++state_.seq;
+  return state_;
+}
+
+Vector3 SimulatedRobot::v_WB(double time) const {
+  constexpr double h = 1e-4;
+  return (motion_.p_WB(time + h) - motion_.p_WB(time - h)) / (2.0 * h);
+}
+
+JointVector SimulatedRobot::joints(double time, const std::array<Vector3, kFeet>& p_WF) const {
+  const Matrix3 R_BW = R_WB(time).transpose();
+  const Vector3 p_WB = motion_.p_WB(time);
+  JointVector q;
+  for (int i = 0; i < kFeet; ++i) {
+    const Vector3 p_LF = kinematics::leg_rotation().transpose() * (R_BW * (p_WF[i] - p_WB) - legs_[i].p_BL);
+    kinematics::LegVector leg_q;
+    if (kinematics::leg_ik(legs_[i], p_LF, motion_.pitch_sum(time), leg_q) != kinematics::LegIkStatus::kOk) {
+      throw std::runtime_error("the test's motion is out of the leg's reach");
+    }
+    q.segment<4>(4 * i) = leg_q;
+  }
+  return q;
+}
+
+void SimulatedRobot::measure(SensorSample& sample) {
+  const double h = kSamplePeriod / kSubsteps;
+  const JointVector q_start = q_;
+  Vector3 gyro = Vector3::Zero(), accelerometer = Vector3::Zero();
+  for (int k = 0; k < kSubsteps; ++k) {
+    const double t1 = time_ + h, t_mid = time_ + 0.5 * h;
+    const Matrix3 R_mid = R_WB(t_mid);
+    const Vector3 w_B = math::log_so3(R_WB(time_).transpose() * R_WB(t1)) / h;
+    gyro += w_B / kSubsteps;
+    accelerometer += R_mid.transpose() * ((v_WB(t1) - v_WB(time_)) / h - gravity_W()) / kSubsteps;
+
+    // The tips' velocities depend on the joints' through rolling: iterate.
+    std::array<Vector3, kFeet> p_WF;
+    JointVector q1;
+    for (int iteration = 0; iteration < 3; ++iteration) {
+      for (int i = 0; i < kFeet; ++i) p_WF[i] = truth_.p_WF[i] + h * foot_velocity_[i];
+      q1 = joints(t1, p_WF);
+      for (int i = 0; i < kFeet; ++i) {
+        const FootMotion foot = motion_.foot(t_mid, i);
+        const auto qd = (q1 - q_).segment<4>(4 * i) / h;
+        const double roll = 0.5 * (q1[4 * i] + q_[4 * i]);
+        const double pitch_rate = qd[1] + qd[2] + qd[3];
+        const Vector3 w_link_B = w_B + Vector3(qd[0], std::cos(roll) * pitch_rate, std::sin(roll) * pitch_rate);
+        const Vector3 rolling = (R_mid * w_link_B).cross(Vector3(0.0, 0.0, kFootRadius));
+        foot_velocity_[i] = foot.velocity + (foot.contact ? rolling : Vector3::Zero());
+      }
+    }
+    truth_.p_WF = p_WF;
+    q_ = q1;
+    time_ = t1;
+  }
+  truth_.R_WB = R_WB(time_);
+  truth_.p_WB = motion_.p_WB(time_);
+  truth_.v_WB = v_WB(time_);
+  truth_.gyro_bias += errors_.gyro_bias_walk * std::sqrt(kSamplePeriod) * gaussian3();
+
+  const double averaging = 1.0 / std::sqrt(static_cast<double>(kImuSamples));
+  sample.gyro = gyro + truth_.gyro_bias + averaging * errors_.gyro_noise * gaussian3();
+  sample.accelerometer = accelerometer + truth_.accelerometer_bias + averaging * errors_.accelerometer_noise * gaussian3();
+  sample.joint_position = q_ + encoder_offset_;
+  sample.joint_velocity = (q_ - q_start) / kSamplePeriod;
+  for (int j = 0; j < kMaxJoints; ++j) {
+    if (errors_.encoder_step > 0.0) {
+      sample.joint_position[j] = errors_.encoder_step * std::round(sample.joint_position[j] / errors_.encoder_step);
+    }
+    sample.joint_velocity[j] += averaging * errors_.joint_velocity_noise * gaussian();
+  }
+  for (int i = 0; i < kFeet; ++i) sample.contact_switch[i] = motion_.foot(time_, i).contact;
+}
+
+}  // namespace stance::estimation::test
