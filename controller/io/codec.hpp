@@ -37,7 +37,7 @@ struct Consumed {
   int periods = 1;
   std::int64_t user_command_seq = 0;
   std::int64_t stop_seq = 0;
-  std::uint64_t hash = 0;  ///< FNV-1a of the consumed bytes
+  std::uint64_t hash = 0;  ///< of the bytes of the newest state, user command and stop that came since the last tick
 };
 
 /// What the wall clock says of a tick.

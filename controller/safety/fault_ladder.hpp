@@ -28,6 +28,8 @@ class FaultLadder {
   SafetyMode step(int periods) noexcept;
 
   SafetyMode mode() const noexcept { return mode_; }
+  /// No good tick leads back to run: the robot fell, the operator stopped it, or it stopped.
+  bool latched() const noexcept { return latched_ || mode_ == SafetyMode::kStop; }
   /// Of the last finished tick.
   std::uint32_t faults() const noexcept { return finished_faults_; }
   const std::array<std::int64_t, kNumFaults>& counts() const noexcept { return counts_; }

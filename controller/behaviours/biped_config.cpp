@@ -1,0 +1,39 @@
+#include "controller/behaviours/biped_config.hpp"
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+namespace stance::behaviours {
+namespace {
+
+void require(bool good, const char* field, double value, const char* range) {
+  if (!good) throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) + ", but must be " + range);
+}
+
+}  // namespace
+
+void BipedConfig::validate() const {
+  estimator.validate();
+  com_offset_observer.validate();
+  force_qp.validate();
+  fault_ladder.validate();
+  validation.validate();
+  require(std::abs(last_link_pitch) < 1.5, "last_link_pitch", last_link_pitch, "within 1.5 rad of zero");
+  require(force_limits.friction > 0.0, "force_qp.friction", force_limits.friction, "> 0");
+  require(force_limits.normal_force_min >= 0.0, "force_qp.normal_force_min", force_limits.normal_force_min, ">= 0 N");
+  require(force_limits.normal_force_max > force_limits.normal_force_min, "force_qp.normal_force_max",
+          force_limits.normal_force_max, "> normal_force_min");
+  require(stand.stages >= 1 && stand.stages <= 100, "stand.stages", stand.stages, "in 1..100");
+  require(stand.state_weights.minCoeff() >= 0.0, "stand.state_weights' least", stand.state_weights.minCoeff(), ">= 0");
+  require(stand.force_weight > 0.0, "stand.force_weight", stand.force_weight, "> 0");
+  require(stand.height_integral_gain >= 0.0, "stand.height_integral_gain", stand.height_integral_gain, ">= 0");
+  require(stand.height_integral_limit >= 0.0, "stand.height_integral_limit", stand.height_integral_limit, ">= 0 m");
+  require(torque_map.null_space_kp >= 0.0, "torque_map.null_space_kp", torque_map.null_space_kp, ">= 0");
+  require(torque_map.null_space_kd >= 0.0, "torque_map.null_space_kd", torque_map.null_space_kd, ">= 0");
+  require(fall.min_upright > 0.0 && fall.min_upright < 1.0, "safety.min_upright", fall.min_upright, "in 0..1");
+  require(fall.min_height > 0.0, "safety.min_height", fall.min_height, "> 0 m");
+  require(damping >= 0.0, "safety.damping", damping, ">= 0");
+}
+
+}  // namespace stance::behaviours

@@ -1,0 +1,52 @@
+#pragma once
+// All that robots/biped/biped.yaml says under `controller`: one struct a module, each with its own validate().
+#include "controller/estimation/base_estimator.hpp"
+#include "controller/estimation/com_offset_observer.hpp"
+#include "controller/force_qp/force_qp.hpp"
+#include "controller/safety/fault_ladder.hpp"
+#include "controller/safety/validation.hpp"
+
+namespace stance::behaviours {
+
+struct ForceLimits {
+  double friction = 0.0;          ///< mu of the planned forces
+  double normal_force_min = 0.0;  ///< N, of a contact in stance
+  double normal_force_max = 0.0;  ///< N
+};
+
+struct StandConfig {
+  int stages = 1;                                                     ///< N, of kControlPeriod each
+  CentroidalState state_weights = CentroidalState::Zero();            ///< Q's diagonal
+  double force_weight = 0.0;                                          ///< R's diagonal
+  double height_integral_gain = 0.0;                                  ///< 1/s
+  double height_integral_limit = 0.0;                                 ///< m
+};
+
+struct TorqueMapConfig {
+  double null_space_kp = 0.0;  ///< 1/s^2
+  double null_space_kd = 0.0;  ///< 1/s
+};
+
+struct FallConfig {
+  double min_upright = 0.0;  ///< z component of B's z axis in W
+  double min_height = 0.0;   ///< m, of B over the feet
+};
+
+struct BipedConfig {
+  double last_link_pitch = 0.0;  ///< rad, q1 + q2 + q3
+  estimation::BaseEstimatorConfig estimator;
+  estimation::CentreOfMassOffsetConfig com_offset_observer;
+  force_qp::Settings force_qp;
+  ForceLimits force_limits;
+  StandConfig stand;
+  TorqueMapConfig torque_map;
+  safety::FaultLadderConfig fault_ladder;
+  safety::ValidationConfig validation;
+  FallConfig fall;
+  double damping = 0.0;  ///< N m s/rad, of the joints while damped
+
+  /// Throws std::invalid_argument naming the field, its value and the allowed range.
+  void validate() const;
+};
+
+}  // namespace stance::behaviours

@@ -1,0 +1,195 @@
+#include "controller/behaviours/biped_controller.hpp"
+
+#include <stdexcept>
+
+namespace stance::behaviours {
+namespace {
+
+std::array<rigid_body::Foot, 2> two_feet(const std::vector<rigid_body::Foot>& feet) {
+  if (feet.size() != 2) {
+    throw std::invalid_argument("a biped has 2 feet, the robot has " + std::to_string(feet.size()));
+  }
+  return {feet[0], feet[1]};
+}
+
+/// The nominal posture, trunk upright: what standing is designed about.
+struct Nominal {
+  double height = 0.0;              ///< m, C over the ground
+  std::array<Vector3, 2> r;         ///< m, from C to the ground points
+  Matrix3 inertia;                  ///< kg m^2, I_eff, diagonal
+};
+
+Nominal nominal_posture(const rigid_body::Model& model, const std::array<rigid_body::Foot, 2>& feet,
+                        const JointVector& q) {
+  rigid_body::State state;
+  state.q = q;
+  rigid_body::Kinematics kinematics;
+  rigid_body::forward_kinematics(model, state, kinematics);
+  rigid_body::Centroidal centroidal;
+  rigid_body::centroidal(model, kinematics, centroidal);
+  Nominal nominal;
+  for (std::size_t i = 0; i < 2; ++i) {
+    const auto link = static_cast<std::size_t>(feet[i].body);
+    const Vector3 p_WF = kinematics.p_W[link] + kinematics.R_W[link] * feet[i].tip;
+    nominal.r[i] = p_WF - Vector3(0.0, 0.0, feet[i].radius) - centroidal.p_WC;
+  }
+  nominal.height = -0.5 * (nominal.r[0].z() + nominal.r[1].z());
+  // The feet held, each leg's redundant joint following its last link's constant pitch: the three pitch rates add up to none.
+  rigid_body::ConstraintRows constant_pitch(2, 6 + model.num_joints);
+  constant_pitch.setZero();
+  for (int leg = 0; leg < 2; ++leg) constant_pitch.block<1, 3>(leg, 6 + 4 * leg + 1).setOnes();
+  const Matrix3 inertia = rigid_body::effective_inertia(model, state, kinematics, feet, constant_pitch);
+  nominal.inertia = inertia.diagonal().asDiagonal();
+  return nominal;
+}
+
+}  // namespace
+
+BipedController::BipedController(const BipedConfig& config, const rigid_body::Model& model,
+                                 const std::vector<rigid_body::Foot>& feet, const JointVector& nominal_joint_position)
+    : config_(config),
+      model_(model),
+      feet_(two_feet(feet)),
+      legs_(kinematics::leg_geometries(model, feet)),
+      fresh_estimator_(config.estimator, legs_, feet_[0].radius),
+      fresh_observer_(config.com_offset_observer, model.total_mass, feet_[0].radius),
+      ladder_(config.fault_ladder),
+      estimator_(fresh_estimator_),
+      observer_(fresh_observer_),
+      torque_map_(config.torque_map, config.last_link_pitch, model_, feet_, legs_),
+      stand_([&] {
+        config.validate();
+        const Nominal nominal = nominal_posture(model_, feet_, nominal_joint_position);
+        return Stand(config.stand, config.force_limits, config.force_qp, model_.total_mass, nominal.inertia, nominal.r,
+                     nominal.height);
+      }()) {}
+
+void BipedController::start_run(std::int64_t run_id) noexcept {
+  memory_ = Memory{};
+  memory_.run_id = run_id;
+  memory_.last.command.num_joints = model_.num_joints;
+  ladder_ = safety::FaultLadder(config_.fault_ladder);
+  estimator_ = fresh_estimator_;
+  observer_ = fresh_observer_;
+}
+
+void BipedController::step(const TickInput& input, StageClock& clock, TickOutput& out) noexcept {
+  const bool fresh = accept(input);
+  clock.stamp(Stage::kValidate);
+
+  out = memory_.last;
+  Trace& trace = out.trace;
+  trace.qp_status = QpStatus::kNotRun;
+  trace.qp_iterations = 0;
+  trace.torques_clipped = 0;
+  if (fresh) {
+    estimate(input.state, trace.estimate);
+    clock.stamp(Stage::kEstimate);
+    plan(input.periods, trace);
+    clock.stamp(Stage::kPlan);
+    stand_.model();
+    clock.stamp(Stage::kModel);
+    // Where it fails, the last plan's forces stay.
+    if (!ladder_.latched() && stand_.solve(out.plan, trace) != QpStatus::kSolved) ladder_.report(Fault::kQpFailed);
+    clock.stamp(Stage::kForceQp);
+    torque_map_.stance(body_, out.plan.force.front(), out.command);
+    clock.stamp(Stage::kTorque);
+    trace.torques_clipped = safety::limit_torques(model_, out.command);
+    if (trace.torques_clipped > 0) ladder_.report(Fault::kTorqueSaturated);
+    if (safety::joint_outside_limits(model_, body_.state.q)) ladder_.report(Fault::kJointLimit);
+  }
+  override_command(ladder_.step(input.periods), out.command);
+  trace.safety = ladder_.mode();
+  trace.faults = ladder_.faults();
+  trace.fault_count = ladder_.counts();
+  memory_.last = out;
+  clock.stamp(Stage::kSafety);
+}
+
+bool BipedController::accept(const TickInput& input) noexcept {
+  const RobotState& state = input.state;
+  if (state.run_id != memory_.run_id) start_run(state.run_id);
+  if (input.operator_stop) ladder_.report(Fault::kOperatorStop);
+
+  const UserCommand& command = input.user_command;
+  if (command.seq != memory_.user_command.seq) {
+    const bool offered = command.behaviour == Behaviour::kStand;
+    if (safety::command_is_plausible(command) && offered) {
+      memory_.user_command = command;
+    } else {
+      memory_.user_command.seq = command.seq;
+      ladder_.report(Fault::kCommandInvalid);
+    }
+  }
+
+  if (!input.state_is_new) {
+    ladder_.report(Fault::kStateStale);
+    return false;
+  }
+  const bool in_order = state.seq > memory_.state_seq && state.utime > memory_.state_utime;
+  if (!in_order || !safety::state_is_plausible(config_.validation, model_, kFeet, state)) {
+    ladder_.report(Fault::kStateInvalid);
+    return false;
+  }
+  memory_.state_seq = state.seq;
+  memory_.state_utime = state.utime;
+  return true;
+}
+
+void BipedController::estimate(const RobotState& state, BaseEstimate& base) noexcept {
+  if (!estimator_.initialised()) estimator_.initialise(state);
+  estimator_.step(state, {}, base);
+
+  body_.state = {base.p_WB, base.R_WB, base.v_WB, base.w_WB_W, state.now().joint_position, state.now().joint_velocity};
+  rigid_body::forward_kinematics(model_, body_.state, body_.kinematics);
+  rigid_body::centroidal(model_, body_.kinematics, body_.centroidal);
+  rigid_body::mass_matrix(model_, body_.state, body_.mass_matrix);
+  rigid_body::gravity_torques(model_, body_.state, body_.gravity);
+  if (has_fallen(base)) ladder_.report(Fault::kRobotFallen);
+}
+
+void BipedController::plan(int periods, Trace& trace) noexcept {
+  const BaseEstimate& base = trace.estimate;
+  StandInput where;
+  where.rpy = math::rpy_from_rotation(base.R_WB);
+  where.rpy.z() = math::unwrap(where.rpy.z(), memory_.yaw);
+  memory_.yaw = where.rpy.z();
+  // A stance that was given up (damped) is taken up anew.
+  if (!memory_.standing || ladder_.mode() == SafetyMode::kDamp) stand_.enter(memory_.yaw);
+  memory_.standing = true;
+
+  const Vector3 radius(0.0, 0.0, feet_[0].radius);
+  for (std::size_t i = 0; i < kFeet; ++i) where.p_WG[i] = base.p_WF[i] - radius;
+  where.v_WC = body_.centroidal.v_WC;
+  where.L_C_W = body_.centroidal.L_C_W;
+  estimation::CentreOfMassOffsetInput seen;
+  seen.p_WC = body_.centroidal.p_WC;
+  seen.v_WC = where.v_WC;
+  seen.L_C_W = where.L_C_W;
+  seen.p_WF = {base.p_WF[0], base.p_WF[1]};
+  seen.yaw = memory_.yaw;
+  seen.standing = base.contact[0] && base.contact[1];
+  where.p_WC = seen.p_WC + observer_.step(seen, kControlPeriod * periods);
+  where.height_offset = memory_.user_command.height_offset;
+  where.periods = periods;
+  StandOutput reference;
+  stand_.plan(where, reference);
+  trace.behaviour = Behaviour::kStand;
+  trace.x = reference.x;
+  trace.x_ref = reference.x_ref;
+}
+
+bool BipedController::has_fallen(const BaseEstimate& base) const noexcept {
+  const double feet_z = 0.5 * (base.p_WF[0].z() + base.p_WF[1].z()) - feet_[0].radius;
+  return base.R_WB(2, 2) < config_.fall.min_upright || base.p_WB.z() - feet_z < config_.fall.min_height;
+}
+
+void BipedController::override_command(SafetyMode mode, JointCommand& command) const noexcept {
+  if (mode != SafetyMode::kDamp && mode != SafetyMode::kStop) return;
+  command = JointCommand{};
+  command.num_joints = model_.num_joints;
+  command.mode = mode == SafetyMode::kDamp ? DriveMode::kDamp : DriveMode::kStop;
+  if (mode == SafetyMode::kDamp) command.kd.head(model_.num_joints).setConstant(config_.damping);
+}
+
+}  // namespace stance::behaviours

@@ -1,0 +1,62 @@
+#pragma once
+// The biped's tick: validate, estimate, plan, model, force QP, torque map, safety.
+#include <array>
+
+#include "controller/behaviours/biped_config.hpp"
+#include "controller/behaviours/stand.hpp"
+#include "controller/behaviours/torque_map.hpp"
+#include "controller/estimation/base_estimator.hpp"
+#include "controller/estimation/com_offset_observer.hpp"
+#include "controller/safety/fault_ladder.hpp"
+
+namespace stance::behaviours {
+
+class BipedController {
+ public:
+  /// Takes all memory. Throws std::invalid_argument where the model is no biped or the configuration is out of range.
+  BipedController(const BipedConfig& config, const rigid_body::Model& model, const std::vector<rigid_body::Foot>& feet,
+                  const JointVector& nominal_joint_position);
+  BipedController(const BipedController&) = delete;  // the torque map refers to the model
+  BipedController& operator=(const BipedController&) = delete;
+
+  /// One tick. The same inputs since construction give the same outputs, bit for bit. A state of another run starts afresh.
+  void step(const TickInput& input, StageClock& clock, TickOutput& out) noexcept;
+
+ private:
+  static constexpr int kFeet = 2;
+
+  /// What a run has made of the controller so far: a new run starts with a new one.
+  struct Memory {
+    std::int64_t run_id = 0;
+    std::int64_t state_seq = 0;      ///< last state acted on
+    std::int64_t state_utime = 0;    ///< us
+    UserCommand user_command;        ///< last plausible one
+    double yaw = 0.0;                ///< rad, unwrapped
+    bool standing = false;
+    TickOutput last;                 ///< what HOLD repeats
+  };
+
+  void start_run(std::int64_t run_id) noexcept;
+  bool accept(const TickInput& input) noexcept;
+  void estimate(const RobotState& state, BaseEstimate& base) noexcept;
+  void plan(int periods, Trace& trace) noexcept;
+  bool has_fallen(const BaseEstimate& base) const noexcept;
+  void override_command(SafetyMode mode, JointCommand& command) const noexcept;
+
+  BipedConfig config_;
+  rigid_body::Model model_;
+  std::array<rigid_body::Foot, kFeet> feet_;
+  std::array<kinematics::LegGeometry, kFeet> legs_;
+  estimation::BaseEstimator fresh_estimator_;   ///< as constructed, for a new run
+  estimation::CentreOfMassOffsetObserver fresh_observer_;
+
+  Memory memory_;
+  safety::FaultLadder ladder_;
+  estimation::BaseEstimator estimator_;
+  estimation::CentreOfMassOffsetObserver observer_;
+  BodyDynamics body_;
+  TorqueMap torque_map_;
+  Stand stand_;
+};
+
+}  // namespace stance::behaviours

@@ -1,0 +1,117 @@
+#include "controller/config/biped_config_yaml.hpp"
+
+#include "controller/config/strict_yaml.hpp"
+
+namespace stance::config {
+namespace {
+
+estimation::BaseEstimatorConfig estimator(StrictYaml yaml) {
+  estimation::BaseEstimatorConfig c;
+  c.gyro_noise = yaml.number("gyro_noise");
+  c.accelerometer_noise = yaml.number("accelerometer_noise");
+  c.position_noise = yaml.number("position_noise");
+  c.gyro_bias_noise = yaml.number("gyro_bias_noise");
+  c.accelerometer_bias_noise = yaml.number("accelerometer_bias_noise");
+  c.stance_foot_noise = yaml.number("stance_foot_noise");
+  c.unloading_foot_noise = yaml.number("unloading_foot_noise");
+  c.swing_foot_noise = yaml.number("swing_foot_noise");
+  c.foot_velocity_sigma = yaml.number("foot_velocity_sigma");
+  c.foot_position_sigma = yaml.number("foot_position_sigma");
+  c.contact_ramp = yaml.number("contact_ramp");
+  c.ramp_gain = yaml.number("ramp_gain");
+  c.slip_gate = yaml.number("slip_gate");
+  c.slip_timeout = yaml.number("slip_timeout");
+  c.slip_inflation = yaml.number("slip_inflation");
+  c.initial_tilt_sigma = yaml.number("initial_tilt_sigma");
+  c.initial_yaw_sigma = yaml.number("initial_yaw_sigma");
+  c.initial_velocity_sigma = yaml.number("initial_velocity_sigma");
+  c.initial_position_sigma = yaml.number("initial_position_sigma");
+  c.initial_foot_sigma = yaml.number("initial_foot_sigma");
+  c.initial_gyro_bias_sigma = yaml.number("initial_gyro_bias_sigma");
+  c.initial_accelerometer_bias_sigma = yaml.number("initial_accelerometer_bias_sigma");
+  yaml.finish();
+  return c;
+}
+
+estimation::CentreOfMassOffsetConfig com_offset_observer(StrictYaml yaml) {
+  estimation::CentreOfMassOffsetConfig c;
+  c.bandwidth = yaml.number("bandwidth");
+  c.limit = yaml.number("limit");
+  yaml.finish();
+  return c;
+}
+
+void force_qp(StrictYaml yaml, force_qp::Settings& settings, behaviours::ForceLimits& limits) {
+  const std::string engine = yaml.text("engine");
+  if (engine == "osqp-condensed") {
+    settings.engine = QpEngine::kOsqpCondensed;
+  } else if (engine == "osqp-sparse") {
+    settings.engine = QpEngine::kOsqpSparse;
+  } else {
+    yaml.fail("engine", "is '" + engine + "', but must be osqp-condensed or osqp-sparse");
+  }
+  settings.tolerance = yaml.number("tolerance");
+  settings.max_iterations = yaml.integer("max_iterations");
+  settings.max_primal_residual = yaml.number("max_primal_residual");
+  limits.friction = yaml.number("friction");
+  limits.normal_force_min = yaml.number("normal_force_min");
+  limits.normal_force_max = yaml.number("normal_force_max");
+  yaml.finish();
+}
+
+behaviours::StandConfig stand(StrictYaml yaml) {
+  behaviours::StandConfig c;
+  c.stages = yaml.integer("stages");
+  const auto weights = yaml.numbers("state_weights", 12);
+  c.state_weights = Eigen::Map<const CentroidalState>(weights.data());
+  c.force_weight = yaml.number("force_weight");
+  c.height_integral_gain = yaml.number("height_integral_gain");
+  c.height_integral_limit = yaml.number("height_integral_limit");
+  yaml.finish();
+  return c;
+}
+
+behaviours::TorqueMapConfig torque_map(StrictYaml yaml) {
+  behaviours::TorqueMapConfig c;
+  c.null_space_kp = yaml.number("null_space_kp");
+  c.null_space_kd = yaml.number("null_space_kd");
+  yaml.finish();
+  return c;
+}
+
+void safety(StrictYaml yaml, behaviours::BipedConfig& c) {
+  c.fault_ladder.hold_time = yaml.number("hold_time");
+  c.fault_ladder.damp_time = yaml.number("damp_time");
+  c.damping = yaml.number("damping");
+  c.fall.min_upright = yaml.number("min_upright");
+  c.fall.min_height = yaml.number("min_height");
+  c.validation.max_angular_velocity = yaml.number("max_angular_velocity");
+  c.validation.max_acceleration = yaml.number("max_acceleration");
+  c.validation.joint_position_margin = yaml.number("joint_position_margin");
+  c.validation.joint_velocity_factor = yaml.number("joint_velocity_factor");
+  yaml.finish();
+}
+
+}  // namespace
+
+behaviours::BipedConfig biped_config_from_yaml(const std::string& yaml_text) {
+  StrictYaml root = StrictYaml::parse(yaml_text, "biped.yaml");
+  StrictYaml yaml = root.mapping("controller");
+  behaviours::BipedConfig c;
+  c.last_link_pitch = yaml.number("last_link_pitch");
+  c.estimator = estimator(yaml.mapping("estimator"));
+  c.com_offset_observer = com_offset_observer(yaml.mapping("com_offset_observer"));
+  force_qp(yaml.mapping("force_qp"), c.force_qp, c.force_limits);
+  c.stand = stand(yaml.mapping("stand"));
+  c.torque_map = torque_map(yaml.mapping("torque_map"));
+  safety(yaml.mapping("safety"), c);
+  yaml.finish();
+  try {
+    c.validate();
+  } catch (const std::invalid_argument& error) {
+    throw ConfigError(std::string("biped.yaml: controller: ") + error.what());
+  }
+  return c;
+}
+
+}  // namespace stance::config

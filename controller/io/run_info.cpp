@@ -1,0 +1,39 @@
+#include "controller/io/run_info.hpp"
+
+#include <cstdio>
+#include <stance_msgs/run_info_t.hpp>
+
+namespace stance::io {
+namespace {
+
+Bytes text_bytes(const std::string& text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
+
+}  // namespace
+
+std::vector<std::uint8_t> encode(const RunInfo& info) {
+  stance_msgs::run_info_t message{};
+  message.program = "stance-controller";
+  message.version = STANCE_VERSION;
+  message.source = STANCE_COMMIT;
+  message.build = STANCE_BUILD;
+  message.robot = info.robot;
+  message.options = info.options;
+  message.urdf = info.urdf;
+  message.configuration = info.configuration;
+  char text[17];
+  std::snprintf(text, sizeof text, "%016llx",
+                static_cast<unsigned long long>(hash(text_bytes(info.configuration), hash(text_bytes(info.urdf)))));
+  message.input_hash = text;
+  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return bytes;
+}
+
+bool decode(Bytes bytes, RunInfo& out) {
+  stance_msgs::run_info_t message;
+  if (message.decode(bytes.data(), 0, static_cast<int>(bytes.size())) < 0) return false;
+  out = {message.robot, message.options, message.urdf, message.configuration};
+  return true;
+}
+
+}  // namespace stance::io

@@ -1,0 +1,54 @@
+#include "controller/loop/loop.hpp"
+#include "controller/loop/wall_clock.hpp"
+
+namespace stance::loop {
+namespace {
+
+constexpr std::int64_t kRunInfoPeriodNs = 1'000'000'000;
+
+}  // namespace
+
+void run_lockstep(Ticker& ticker, io::Transport& transport, const std::vector<std::uint8_t>& run_info,
+                  const std::atomic<bool>& stop) {
+  WallClock clock;
+  io::Message timing;
+  std::int64_t last_utime = 0;
+
+  const auto answer = [&] {
+    transport.publish(io::channel::kForcePlan, ticker.plan().bytes());
+    transport.publish(io::channel::kJointCommand, ticker.command().bytes());
+    transport.publish(io::channel::kTrace, ticker.trace().bytes());
+  };
+  transport.subscribe(io::channel::kUserCommand,
+                      [&](io::Bytes bytes) { static_cast<void>(ticker.offer_user_command(bytes)); });
+  transport.subscribe(io::channel::kStop, [&](io::Bytes bytes) { static_cast<void>(ticker.offer_stop(bytes)); });
+  transport.subscribe(io::channel::kRobotState, [&](io::Bytes bytes) {
+    RobotState state;
+    if (!io::decode(bytes, state)) return;
+    const io::Header& answered = ticker.header();
+    if (answered.seq > 0 && state.run_id == answered.run_id && state.seq == answered.state_seq) {
+      answer();
+      return;
+    }
+    clock.start();
+    const bool same_run = answered.seq > 0 && state.run_id == answered.run_id;
+    static_cast<void>(ticker.offer_state(bytes));
+    ticker.tick(same_run ? periods_between(last_utime, state.utime) : 1, clock);
+    last_utime = state.utime;
+    answer();
+    clock.finish();
+    io::encode(ticker.header(), clock.timing(), timing);
+    transport.publish(io::channel::kTiming, timing.bytes());
+  });
+
+  std::int64_t next_info_ns = 0;
+  while (!stop.load(std::memory_order_relaxed)) {
+    if (monotonic_ns() >= next_info_ns) {
+      transport.publish(io::channel::kRunInfo, run_info);
+      next_info_ns = monotonic_ns() + kRunInfoPeriodNs;
+    }
+    transport.handle(100);
+  }
+}
+
+}  // namespace stance::loop

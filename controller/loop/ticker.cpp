@@ -1,0 +1,74 @@
+#include "controller/loop/ticker.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stance::loop {
+namespace {
+
+std::uint64_t combined(const std::array<std::uint64_t, 3>& hashes) noexcept {
+  std::uint64_t value = io::kHashSeed;
+  for (const std::uint64_t hash : hashes) value = (value ^ hash) * 1099511628211ULL;
+  return value;
+}
+
+constexpr double kPeriodUs = kControlPeriod * 1e6;
+
+}  // namespace
+
+int periods_between(std::int64_t utime, std::int64_t next_utime) noexcept {
+  const double periods = std::round(static_cast<double>(next_utime - utime) / kPeriodUs);
+  return static_cast<int>(std::clamp(periods, 1.0, 1e6));
+}
+
+bool Ticker::offer_state(io::Bytes bytes) noexcept {
+  const std::int64_t run_id = input_.state.run_id;
+  if (!io::decode(bytes, input_.state)) return false;
+  if (input_.state.run_id != run_id) {
+    // An operator's stop ends with its run.
+    input_.operator_stop = false;
+    consumed_.stop_seq = 0;
+  }
+  consumed_.state_is_new = true;
+  state_hash_ = io::hash(bytes);
+  return true;
+}
+
+bool Ticker::offer_user_command(io::Bytes bytes) noexcept {
+  if (!io::decode(bytes, input_.user_command)) return false;
+  consumed_.user_command_seq = input_.user_command.seq;
+  user_command_hash_ = io::hash(bytes);
+  return true;
+}
+
+bool Ticker::offer_stop(io::Bytes bytes) noexcept {
+  io::Stop stop;
+  if (!io::decode(bytes, stop)) return false;
+  input_.operator_stop = true;
+  consumed_.stop_seq = stop.seq;
+  stop_hash_ = io::hash(bytes);
+  return true;
+}
+
+void Ticker::tick(int periods, StageClock& clock) noexcept {
+  consumed_.periods = periods;
+  consumed_.hash = combined({state_hash_, user_command_hash_, stop_hash_});
+  late_periods_ = consumed_.state_is_new ? 0 : late_periods_ + periods;
+  input_.state_is_new = consumed_.state_is_new;
+  input_.periods = periods;
+  clock.stamp(Stage::kDecode);
+  tick_(input_, clock, output_);
+
+  header_.utime = input_.state.utime + late_periods_ * static_cast<std::int64_t>(kPeriodUs);
+  header_.seq += 1;
+  header_.state_seq = input_.state.seq;
+  header_.run_id = input_.state.run_id;
+  io::encode(header_, output_.plan, plan_);
+  io::encode(header_, output_.command, command_);
+  io::encode(header_, consumed_, output_.trace, trace_);
+  consumed_.state_is_new = false;
+  state_hash_ = user_command_hash_ = stop_hash_ = 0;
+  clock.stamp(Stage::kEncode);
+}
+
+}  // namespace stance::loop

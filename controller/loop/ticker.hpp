@@ -1,0 +1,50 @@
+#pragma once
+// One tick of any robot, from the newest messages' bytes to the bytes to publish. The real-time loop, the lockstep loop, the
+// rollout and the replay all run this, so that the same inputs give the same bits.
+#include <functional>
+
+#include "controller/io/codec.hpp"
+
+namespace stance::loop {
+
+/// A robot's tick. Must not throw.
+using TickFunction = std::function<void(const TickInput&, StageClock&, TickOutput&)>;
+
+/// Control periods from one state's stamp to the next one's, at least 1.
+int periods_between(std::int64_t utime, std::int64_t next_utime) noexcept;
+
+class Ticker {
+ public:
+  explicit Ticker(TickFunction tick) : tick_(std::move(tick)) {}
+
+  /// The newest message of a kind, for the next tick. False where the bytes are not a message of that type.
+  [[nodiscard]] bool offer_state(io::Bytes bytes) noexcept;
+  [[nodiscard]] bool offer_user_command(io::Bytes bytes) noexcept;
+  [[nodiscard]] bool offer_stop(io::Bytes bytes) noexcept;
+
+  /// Is there a state that no tick has consumed?
+  bool has_new_state() const noexcept { return consumed_.state_is_new; }
+  const RobotState& state() const noexcept { return input_.state; }
+
+  /// Runs the tick, `periods` control periods after the last one.
+  void tick(int periods, StageClock& clock) noexcept;
+
+  const io::Header& header() const noexcept { return header_; }
+  const TickOutput& output() const noexcept { return output_; }
+  const io::Message& plan() const noexcept { return plan_; }
+  const io::Message& command() const noexcept { return command_; }
+  const io::Message& trace() const noexcept { return trace_; }
+
+ private:
+  TickFunction tick_;
+  TickInput input_;
+  TickOutput output_;
+  io::Header header_;
+  io::Consumed consumed_;  ///< by the coming tick
+  // Of the newest bytes of each kind since the last tick, 0 for none.
+  std::uint64_t state_hash_ = 0, user_command_hash_ = 0, stop_hash_ = 0;
+  std::int64_t late_periods_ = 0;  ///< since the state in use
+  io::Message plan_, command_, trace_;
+};
+
+}  // namespace stance::loop

@@ -1,0 +1,68 @@
+// stance-controller: arguments -> configuration -> loop.
+#include <CLI/CLI.hpp>
+#include <atomic>
+#include <csignal>
+#include <iostream>
+
+#include "controller/compose.hpp"
+#include "controller/io/run_info.hpp"
+#include "controller/loop/loop.hpp"
+#include "controller/loop/real_time_setup.hpp"
+
+namespace {
+
+std::atomic<bool> stop{false};
+static_assert(std::atomic<bool>::is_always_lock_free);
+void on_signal(int /*signal*/) { stop.store(true, std::memory_order_relaxed); }
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  using namespace stance;
+  CLI::App app{"Stance's controller: answers ROBOT_STATE with JOINT_COMMAND over LCM, every 10 ms."};
+  app.set_version_flag("--version", STANCE_VERSION);
+  std::string robot_name, url = io::kDefaultUrl, engine;
+  bool lockstep = false, real_time = false;
+  int priority = 80, cpu = -1;
+  loop::RealTimeConfig config;
+  app.add_option("--robot", robot_name, "robots/<robot>")->required();
+  auto* lockstep_flag = app.add_flag("--lockstep", lockstep, "Answer each state once, as fast as they come");
+  app.add_flag("--realtime", real_time, "Tick on absolute deadlines (default)")->excludes(lockstep_flag);
+  app.add_option("--solver", engine, "Engine of the force QP in place of the robot's own: osqp-condensed or osqp-sparse");
+  app.add_option("--lcm-url", url, "LCM's network")->capture_default_str();
+  app.add_option("--priority", priority, "SCHED_FIFO priority")->check(CLI::Range(1, 99))->capture_default_str();
+  app.add_option("--cpu", cpu, "Core to pin to");
+  app.add_option("--phase", config.phase, "Seconds from a state's stamp to the tick that takes it")
+      ->check(CLI::Range(0.0, 0.009))
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+
+  try {
+    auto robot = config::load_robot(config::share_directory() / "robots", robot_name);
+    if (!engine.empty()) robot.yaml_text = with_engine(robot.yaml_text, engine);
+    loop::Ticker ticker(compose(robot));
+    std::string options;
+    for (int i = 1; i < argc; ++i) options += (i > 1 ? " " : "") + std::string(argv[i]);
+    const auto run_info = io::encode(io::RunInfo{robot.name, options, robot.urdf_text, robot.yaml_text});
+
+    std::signal(SIGINT, on_signal);
+    std::signal(SIGTERM, on_signal);
+    if (lockstep) {
+      io::Transport transport(url);
+      loop::run_lockstep(ticker, transport, run_info, stop);
+    } else {
+      const std::string refused = loop::enter_real_time(priority, cpu);
+      if (!refused.empty()) std::cerr << "stance-controller: without real-time privileges (" << refused << ")\n";
+      io::Transport transport(url);
+      loop::run_real_time(ticker, transport, run_info, config, stop);
+    }
+  } catch (const std::exception& error) {
+    std::cerr << "stance-controller: " << error.what() << "\n";
+    return 2;
+  }
+  return 0;
+}
