@@ -2,7 +2,8 @@
 // The force QP: over N stages, states x_1..x_N (12) and forces f_0..f_(N-1) (3 per contact),
 //
 //   min  sum_k ||x_k - xref_k||^2_Q + ||f_k - fref_k||^2_R    (the last state weighs P instead of Q where P is given)
-//   s.t. x_(k+1) = A_k x_k + B_k f_k + g_k,    |fx|, |fy| <= mu fz,    fz_min <= fz <= fz_max  for each contact and stage;
+//   s.t. x_(k+1) = A_k x_k + B_k f_k + g_k,    |fx|, |fy| <= mu fz,    fz_min <= fz <= fz_max  for each contact and
+//   stage;
 //        a contact in swing has fz_min = fz_max = 0, hence f = 0.
 //
 // Sizes and sparsity are frozen at set-up: a contact change alters bounds and values, never dimensions.
@@ -26,20 +27,20 @@ struct Sizes {
 /// One stage k: from x_k to x_(k+1).
 struct StageData {
   Dynamics dynamics;
-  StateVector x_ref = StateVector::Zero();       ///< reference of x_(k+1)
-  ForceVector f_ref;                             ///< N, 3n
-  StateVector Q = StateVector::Zero();           ///< diagonal, on x_(k+1)
-  ForceVector R;                                 ///< diagonal, 3n, positive
-  std::array<double, kMaxContacts> fz_min{};     ///< N
-  std::array<double, kMaxContacts> fz_max{};     ///< N
+  StateVector x_ref = StateVector::Zero();    ///< reference of x_(k+1)
+  ForceVector f_ref;                          ///< N, 3n
+  StateVector Q = StateVector::Zero();        ///< diagonal, on x_(k+1)
+  ForceVector R;                              ///< diagonal, 3n, positive
+  std::array<double, kMaxContacts> fz_min{};  ///< N
+  std::array<double, kMaxContacts> fz_max{};  ///< N
 };
 
 struct Problem {
-  explicit Problem(Sizes sizes);                 ///< takes all memory
+  explicit Problem(Sizes sizes);  ///< takes all memory
   Sizes sizes;
   StateVector x0 = StateVector::Zero();
-  double friction = 0.0;                         ///< mu, of every contact
-  std::vector<StageData> stages;                 ///< N
+  double friction = 0.0;          ///< mu, of every contact
+  std::vector<StageData> stages;  ///< N
   bool has_terminal_cost = false;
   StateMatrix terminal_cost = StateMatrix::Zero();  ///< P, symmetric positive semidefinite
 };
@@ -49,28 +50,32 @@ struct Solution {
   QpStatus status = QpStatus::kNotRun;
   QpEngine engine = QpEngine::kOsqpCondensed;
   int iterations = 0;
-  double primal_residual = 0.0;                  ///< N, largest violation of a force constraint
-  double dual_residual = 0.0;                    ///< N, largest step of a projected gradient (see kkt.hpp)
-  int active = 0;                                ///< constraints active in stage 0
-  std::vector<ForceVector> forces;               ///< f_0..f_(N-1), N in W
-  std::vector<StateVector> states;               ///< x_1..x_N
+  double primal_residual = 0.0;     ///< N, largest violation of a force constraint
+  double dual_residual = 0.0;       ///< N, largest step of a projected gradient (see kkt.hpp)
+  int active = 0;                   ///< constraints active in stage 0
+  std::vector<ForceVector> forces;  ///< f_0..f_(N-1), N in W
+  std::vector<StateVector> states;  ///< x_1..x_N
 };
 
 struct Settings {
   QpEngine engine = QpEngine::kOsqpCondensed;
-  double tolerance = 1e-6;        ///< OSQP's eps_abs and eps_rel, on the scaled problem
-  int max_iterations = 4000;      ///< a deterministic bound on a solve
-  int check_interval = 25;        ///< iterations between termination checks
+  double tolerance = 1e-6;    ///< OSQP's eps_abs and eps_rel, on the scaled problem
+  int max_iterations = 4000;  ///< a deterministic bound on a solve
+  int check_interval = 25;    ///< iterations between termination checks
   double rho = 0.1;
   double max_primal_residual = 0.5;  ///< N, above it a solution is kInaccurate
-  void validate() const;          ///< throws std::invalid_argument naming the field, its value and the range
+  bool try_free_minimiser = true;    ///< step 1 of osqp_engine.hpp
+  bool correct_active_set = true;    ///< step 3 of osqp_engine.hpp
+  void validate() const;             ///< throws std::invalid_argument naming the field, its value and the range
 };
 
-/// An engine. `solve` is noexcept, allocates nothing, never blocks and gives the same bits for the same sequence of problems.
+/// An engine. `solve` is noexcept, allocates nothing, never blocks and gives the same bits for the same sequence of
+/// problems.
 class ForceQp {
  public:
   virtual ~ForceQp() = default;
-  /// Forces of `problem` into `solution`; forces are usable only where the status is kSolved. Warm-starts from the last solve.
+  /// Forces of `problem` into `solution`; forces are usable only where the status is kSolved. Warm-starts from the last
+  /// solve.
   virtual QpStatus solve(const Problem& problem, Solution& solution) noexcept = 0;
   /// Forgets the last solve: the next starts cold.
   virtual void reset() noexcept = 0;

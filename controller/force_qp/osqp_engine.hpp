@@ -1,0 +1,17 @@
+#pragma once
+// The force QP by OSQP, in either form, in three steps, each judged by the independent check of kkt.hpp:
+//
+//   1. the free minimiser, by one backward recursion: where it satisfies every constraint it is the solution, 0
+//   iterations;
+//   2. OSQP, warm-started from the last solution, to a coarse and then to the full tolerance;
+//   3. after each of the two the minimiser under the constraints that OSQP finds active, its set corrected a bounded
+//   number
+//      of times by the signs of the multipliers: where the check finds it exact it is the solution.
+#include "controller/force_qp/force_qp.hpp"
+
+namespace stance::force_qp {
+
+/// An engine on OSQP, in the form that `settings.engine` names.
+std::unique_ptr<ForceQp> make_osqp_engine(const Settings& settings, Sizes sizes, double typical_force);
+
+}  // namespace stance::force_qp
