@@ -1,25 +1,29 @@
 #pragma once
 // The base's state and its error: the maps of the error-state filter and their Jacobians.
 //
-// State: R_WB, v_WB, p_WB, the feet's tips p_WF (left, right), gyro bias b_g and accelerometer bias b_a (in B).
-// Error, 21 = 7 x 3: (theta, v, p, f_left, f_right, b_g, b_a), additive but for R_true = exp([theta]x) R, theta in W.
+// State: R = R_WB, v = v_WB, p = p_WB, the tips of the feet from B d_i = p_BF_W (left, right), gyro bias b_g and
+// accelerometer bias b_a (in B). Error, 21 = 7 x 3, in this order, theta to d_i in W:
+//   R_true = exp([theta]x) R        v_true = exp([theta]x) v + dv        p_true = p + dp
+//   d_true = exp([theta]x) d + dd_left, dd_right        b_true = b + db_g, db_a
+// v and d turn with theta (the right-invariant error of Hartley et al., IJRR 2020): no Jacobian below holds a direction
+// of measured or estimated motion, so that noise cannot make the yaw and the accelerometer's bias look observed. With
+// the additive error it does: the filter is sure of a yaw that drifts with the gyro's bias.
 //
 // A sample of `dt` seconds brings means (gyro, accelerometer, joint velocity) and, at its end, joint positions. A mean
-// stands for the sample's middle, so that the filter lags nothing: with w = gyro - b_g, s = accelerometer - b_a, R_mid
+// stands for the sample's middle, so that the filter does not lag: with w = gyro - b_g, s = accelerometer - b_a, R_mid
 // at the middle
-//   predict    a = R_mid s + g        R = R exp(w dt)        p += v dt + a dt^2/2        v += a dt
-//   F          theta' = theta - R_mid dt b_g        dv = -[R_mid s]x dt theta_mid - R_mid dt b_a
-//              v' = v + dv        p' = p + dt v + dt/2 dv        theta_mid = (theta + theta')/2        all else
-//              unchanged
+//   predict    a = R_mid s + g     R = R exp([w dt]x)     p += v dt + a dt^2/2     v += a dt     d -= v_mid dt (the
+//   foot stays) F          turn = dt R_mid db_g                          theta_mid = theta - turn/2
+//              change = dt [g]x theta_mid - [v_mid]x turn - dt R_mid db_a
+//              dp += dt (dv + change/2) - dt [v_mid]x theta_mid
+//              dd -= dt (dv + change/2) + [d_mid]x turn        dv += change        theta -= turn
 //   rolling    the tip is the centre of a sphere of radius r: u = w_link x (0, 0, r); a stance foot moves by u dt.
-//              F leaves out how u varies with the error: r dt = 1e-4 m/rad
-//   velocity   the point of the sphere on the ground rests: 0 = v_mid + a_v - u,  v_mid = v - a dt/2,
+//              F leaves out how u varies with the tilt: r dt |w| = 1e-4 m/rad
+//   velocity   the point of the sphere on the ground rests: z = u - a_v - v_mid = 0,  v_mid = v - a dt/2,
 //              a_v = R_mid (J qd + w x c),  w_link = R_mid (w + w_BF)
-//              H: theta_mid: -[a_v]x + dt/2 [R_mid s]x - [r]x [w_link]x    v: I    b_g: R_mid [c]x - [r]x R_mid
-//                 b_a: dt/2 R_mid    with theta_mid = theta + R_mid dt/2 b_g    [r]x = skew(0, 0, r)
-//   position   0 = f - p - R c
-//              H: theta: [R c]x    p: -I    f: I
-#include <Eigen/Core>
+//              H: theta_mid: -[w_link]x [r]x - dt/2 [g]x    dv: I    db_g: R_mid [c]x - [r]x R_mid + dt/2 [v]x R_mid
+//                 db_a: dt/2 R_mid    with theta_mid = theta + turn/2    [r]x = skew(0, 0, r)
+//   position   z = R c - d = 0         H: dd: I
 #include <array>
 
 #include "controller/estimation/kalman_filter.hpp"
@@ -44,11 +48,11 @@ constexpr int foot_index(int foot) { return kFoot + 3 * foot; }
 
 struct BaseState {
   Matrix3 R_WB = Matrix3::Identity();
-  Vector3 v_WB = Vector3::Zero();                                     ///< m/s
-  Vector3 p_WB = Vector3::Zero();                                     ///< m
-  std::array<Vector3, kFeet> p_WF{Vector3::Zero(), Vector3::Zero()};  ///< m, tips
-  Vector3 gyro_bias = Vector3::Zero();                                ///< rad/s, in B
-  Vector3 accelerometer_bias = Vector3::Zero();                       ///< m/s^2, in B
+  Vector3 v_WB = Vector3::Zero();                                       ///< m/s
+  Vector3 p_WB = Vector3::Zero();                                       ///< m
+  std::array<Vector3, kFeet> p_BF_W{Vector3::Zero(), Vector3::Zero()};  ///< m, tips
+  Vector3 gyro_bias = Vector3::Zero();                                  ///< rad/s, in B
+  Vector3 accelerometer_bias = Vector3::Zero();                         ///< m/s^2, in B
 };
 
 /// The state that is `error` away from `state`.
@@ -71,18 +75,19 @@ struct FootMeasurement {
   Vector3 w_BF = Vector3::Zero();      ///< rad/s, of the foot's link against B, at its middle
 };
 
-/// F of one sample, by its blocks: it is the identity but for the rows of theta, v and p.
+/// F of one sample, by its blocks.
 struct Transition {
-  Matrix3 theta_by_gyro_bias = Matrix3::Zero();
-  Matrix3 v_by_theta = Matrix3::Zero();
-  Matrix3 v_by_accelerometer_bias = Matrix3::Zero();
-  double dt = 0.0;  ///< s
+  Matrix3 turn_by_gyro_bias = Matrix3::Zero();                                ///< dt R_mid
+  Matrix3 velocity_by_theta = Matrix3::Zero();                                ///< dt [g]x
+  Matrix3 velocity_by_turn = Matrix3::Zero();                                 ///< -[v_mid]x
+  std::array<Matrix3, kFeet> foot_by_turn{Matrix3::Zero(), Matrix3::Zero()};  ///< -[d_mid]x
+  double dt = 0.0;                                                            ///< s
 
   /// M = F M in place.
   void multiply(ErrorMatrix& M) const noexcept;
 };
 
-/// One sample ahead; feet stay where they are.
+/// One sample ahead; the feet stay where they are in W.
 Transition predict(BaseState& state, const ImuMean& imu) noexcept;
 
 /// u: the velocity of a rolling foot's tip [m/s, in W], of the state at the sample's end.
@@ -98,10 +103,7 @@ struct ErrorMeasurement {
 /// The stance foot's ground point rests.
 ErrorMeasurement velocity_measurement(const BaseState& state, const ImuMean& imu, const FootMeasurement& foot,
                                       double foot_radius) noexcept;
-/// The stance foot's tip is where it was.
+/// The stance foot's tip is where it was: the joints say where that is from B.
 ErrorMeasurement position_measurement(const BaseState& state, const FootMeasurement& foot, int index) noexcept;
-
-/// M = G M in place, G the error's map when foot `index` is put anew at its tip, f = p + R c: f' = p - [R c]x theta.
-void multiply_by_clone(const BaseState& state, const FootMeasurement& foot, int index, ErrorMatrix& M) noexcept;
 
 }  // namespace stance::estimation

@@ -2,20 +2,20 @@
 //
 //   contact     = contact switch and planned stance
 //   trust alpha = min(1, time in contact / contact_ramp, load)
-//   1. predict  state and P; a foot in contact rolls: f += u dt
+//   1. predict  state and P; a foot in contact rolls: d += u dt
 //   2. gate     a foot in contact slips where its velocity's NIS > slip_gate, before any update: its velocity is
 //   skipped, its
 //               time in contact starts again. A foot refused for slip_timeout is believed, its variance times
 //               slip_inflation.
-//   3. feet     not in contact or slipping: f = p + R c anew, its covariance with it, plus swing_foot_noise^2 dt;
-//               others: plus (stance_foot_noise + unloading_foot_noise (1 - alpha))^2 dt
+//   3. feet     not in contact or slipping: d = R c anew, its error uncorrelated, of variance swing_foot_noise^2 dt;
+//               others: variance plus (stance_foot_noise + unloading_foot_noise (1 - alpha))^2 dt
 //   4. update   each foot in contact: velocity (unless it slips), position; variances times 1 + ramp_gain (1 - alpha)
 //
 // Gating the velocity alone would not do: a slipping foot's position drags velocity and tilt with it, hence step 3 for
 // it too.
 //
 // At the start the accelerometer gives the tilt, so that its bias and the tilt's error are one: theta = z x (R b_a)/g +
-// own error. P starts with that correlation; without it the filter would count the accelerometer twice.
+// own error. P starts with that correlation: without it the filter would count the accelerometer twice.
 #include "controller/estimation/base_estimator.hpp"
 
 #include <algorithm>
@@ -35,7 +35,7 @@ ImuMean imu_mean(const SensorSample& sample, double dt) { return {sample.gyro, s
 /// The rotation next to R, for an R that rounding alone has moved (one Newton step).
 Matrix3 orthonormal(const Matrix3& R) { return 1.5 * R - 0.5 * R * R.transpose() * R; }
 
-Vector3 sigma(const ErrorMatrix& P, int begin) { return P.diagonal().segment<3>(begin).cwiseMax(0.0).cwiseSqrt(); }
+Vector3 sigma(const Vector3& variance) { return variance.cwiseMax(0.0).cwiseSqrt(); }
 
 }  // namespace
 
@@ -100,15 +100,14 @@ void BaseEstimator::initialise(const RobotState& state) noexcept {
   Vector3 origin = Vector3::Zero();  // W's, from B's origin, with the axes of W
   int on_ground = 0;
   for (int i = 0; i < kFeet; ++i) {
-    state_.p_WF[i] = state_.R_WB * measure_foot(now, i, 0.0).p_BF;
-    origin.head<2>() += state_.p_WF[i].head<2>() / kFeet;
+    state_.p_BF_W[i] = state_.R_WB * measure_foot(now, i, 0.0).p_BF;
+    origin.head<2>() += state_.p_BF_W[i].head<2>() / kFeet;
     if (any_on && !now.contact_switch[i]) continue;
-    origin.z() += state_.p_WF[i].z() - foot_radius_;
+    origin.z() += state_.p_BF_W[i].z() - foot_radius_;
     ++on_ground;
   }
   origin.z() /= on_ground;
   state_.p_WB = -origin;
-  for (Vector3& p_WF : state_.p_WF) p_WF -= origin;
 
   const BaseEstimatorConfig& c = config_;
   ErrorVector sigma0;
@@ -183,10 +182,10 @@ void BaseEstimator::step_sample(const SensorSample& sample, double dt, const Con
     feet[i] = measure_foot(sample, i, dt);
     in_contact_[i] = sample.contact_switch[i] && plan.stance[i];
     contact_time_[i] = in_contact_[i] ? contact_time_[i] + dt : 0.0;
-    if (in_contact_[i]) state_.p_WF[i] += dt * rolling_velocity(state_, imu, feet[i], foot_radius_);
+    if (in_contact_[i]) state_.p_BF_W[i] += dt * rolling_velocity(state_, imu, feet[i], foot_radius_);
   }
 
-  // Both gates before any update and any clone: each foot is judged by the prediction alone.
+  // Both gates before any update: each foot is judged by the prediction alone.
   for (int i = 0; i < kFeet; ++i) gate(imu, feet[i], i);
 
   std::array<double, kFeet> variance_scale;
@@ -198,10 +197,10 @@ void BaseEstimator::step_sample(const SensorSample& sample, double dt, const Con
       const double noise = c.stance_foot_noise + c.unloading_foot_noise * (1.0 - trust);
       filter_.P.diagonal().segment<3>(foot_index(i)).array() += squared(noise) * dt;
     } else {
-      state_.p_WF[i] = state_.p_WB + state_.R_WB * feet[i].p_BF;
-      ErrorVector q = ErrorVector::Zero();
-      q.segment<3>(foot_index(i)).setConstant(squared(c.swing_foot_noise) * dt);
-      filter_.predict_covariance([&](ErrorMatrix& M) { multiply_by_clone(state_, feet[i], i, M); }, q);
+      state_.p_BF_W[i] = state_.R_WB * feet[i].p_BF;
+      filter_.P.middleRows<3>(foot_index(i)).setZero();
+      filter_.P.middleCols<3>(foot_index(i)).setZero();
+      filter_.P.diagonal().segment<3>(foot_index(i)).setConstant(squared(c.swing_foot_noise) * dt);
     }
   }
 
@@ -217,7 +216,7 @@ void BaseEstimator::step_sample(const SensorSample& sample, double dt, const Con
 
   // A swing foot's tip is where the corrected base puts it.
   for (int i = 0; i < kFeet; ++i) {
-    if (!in_contact_[i]) state_.p_WF[i] = state_.p_WB + state_.R_WB * feet[i].p_BF;
+    if (!in_contact_[i]) state_.p_BF_W[i] = state_.R_WB * feet[i].p_BF;
   }
 }
 
@@ -254,11 +253,16 @@ void BaseEstimator::write(const SensorSample& now, BaseEstimate& estimate) const
   estimate.w_WB_W = state_.R_WB * (now.gyro - state_.gyro_bias);
   estimate.gyro_bias = state_.gyro_bias;
   estimate.accelerometer_bias = state_.accelerometer_bias;
-  estimate.sigma_p = sigma(filter_.P, kPosition);
-  estimate.sigma_v = sigma(filter_.P, kVelocity);
-  estimate.sigma_theta = sigma(filter_.P, kTheta);
+  // v's additive error is dv - [v]x theta.
+  const Matrix3 theta_part = -math::skew(state_.v_WB);
+  const Matrix3 cross = theta_part * filter_.P.block<3, 3>(kTheta, kVelocity);
+  const Matrix3 velocity_covariance = filter_.P.block<3, 3>(kVelocity, kVelocity) + cross + cross.transpose() +
+                                      theta_part * filter_.P.block<3, 3>(kTheta, kTheta) * theta_part.transpose();
+  estimate.sigma_p = sigma(filter_.P.diagonal().segment<3>(kPosition));
+  estimate.sigma_v = sigma(velocity_covariance.diagonal());
+  estimate.sigma_theta = sigma(filter_.P.diagonal().segment<3>(kTheta));
   for (int i = 0; i < kFeet; ++i) {
-    estimate.p_WF[i] = state_.p_WF[i];
+    estimate.p_WF[i] = state_.p_WB + state_.p_BF_W[i];
     estimate.contact[i] = in_contact_[i];
   }
   estimate.nis = updates_ > 0 ? nis_sum_ / (3 * updates_) : 0.0;

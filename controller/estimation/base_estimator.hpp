@@ -32,7 +32,7 @@ struct BaseEstimatorConfig {
   double initial_yaw_sigma = 0.0;         ///< rad
   double initial_velocity_sigma = 0.0;    ///< m/s
   double initial_position_sigma = 0.0;    ///< m
-  double initial_foot_sigma = 0.0;        ///< m
+  double initial_foot_sigma = 0.0;        ///< m, of the tips from B
   double initial_gyro_bias_sigma = 0.0;   ///< rad/s
   double initial_accelerometer_bias_sigma = 0.0;  ///< m/s^2
   void validate() const;  ///< throws std::invalid_argument naming the field, its value and the range

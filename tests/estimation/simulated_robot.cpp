@@ -50,14 +50,15 @@ std::array<kinematics::LegGeometry, kFeet> test_legs() {
   return legs;
 }
 
-Motion standing_motion() {
+Motion standing_motion(double amplitude) {
+  // Each part is amplitude (1 - cos(w t)), faded in over a second so that the robot starts at rest, acceleration
+  // included.
+  const auto sway = [amplitude](double size, double w, double t) {
+    return amplitude * size * (1.0 - std::cos(w * t)) * (1.0 - std::exp(-t * t));
+  };
   Motion motion;
-  motion.p_WB = [](double t) {
-    return Vector3(0.02 * (1.0 - std::cos(2.1 * t)), 0.03 * (1.0 - std::cos(1.3 * t)), 0.80 + 0.01 * (1.0 - std::cos(3.0 * t)));
-  };
-  motion.rpy = [](double t) {
-    return Vector3(0.03 * (1.0 - std::cos(1.7 * t)), 0.05 * (1.0 - std::cos(2.6 * t)), 0.04 * (1.0 - std::cos(0.9 * t)));
-  };
+  motion.p_WB = [sway](double t) { return Vector3(sway(0.02, 2.1, t), sway(0.03, 1.3, t), 0.80 + sway(0.01, 3.0, t)); };
+  motion.rpy = [sway](double t) { return Vector3(sway(0.03, 1.7, t), sway(0.05, 2.6, t), sway(0.04, 0.9, t)); };
   return motion;
 }
 
@@ -78,15 +79,15 @@ SimulatedRobot::SimulatedRobot(Motion motion, const SensorErrors& errors, std::u
     : motion_(std::move(motion)), errors_(errors), random_(seed) {
   const Vector3 p_WB = motion_.p_WB(0.0);
   const Vector3 heading_offset(0.0, legs_[0].p_BL.y(), 0.0);
-  truth_.p_WF = {Vector3(p_WB.x(), p_WB.y(), kFootRadius) + heading_offset,
-                 Vector3(p_WB.x(), p_WB.y(), kFootRadius) - heading_offset};
+  p_WF_ = {Vector3(p_WB.x(), p_WB.y(), kFootRadius) + heading_offset,
+           Vector3(p_WB.x(), p_WB.y(), kFootRadius) - heading_offset};
   truth_.p_WB = p_WB;
   truth_.R_WB = R_WB(0.0);
   truth_.v_WB = v_WB(0.0);
   truth_.gyro_bias = errors_.gyro_bias * Vector3(sign(), sign(), sign());
   truth_.accelerometer_bias = errors_.accelerometer_bias * Vector3(sign(), sign(), sign());
   for (double& offset : encoder_offset_) offset = errors_.encoder_offset * sign();
-  q_ = joints(0.0, truth_.p_WF);
+  q_ = joints(0.0, p_WF_);
   state_.num_joints = kMaxJoints;
   state_.num_contacts = kFeet;
   state_.sample_period = kSamplePeriod;
@@ -134,7 +135,7 @@ void SimulatedRobot::measure(SensorSample& sample) {
     std::array<Vector3, kFeet> p_WF;
     JointVector q1;
     for (int iteration = 0; iteration < 3; ++iteration) {
-      for (int i = 0; i < kFeet; ++i) p_WF[i] = truth_.p_WF[i] + h * foot_velocity_[i];
+      for (int i = 0; i < kFeet; ++i) p_WF[i] = p_WF_[i] + h * foot_velocity_[i];
       q1 = joints(t1, p_WF);
       for (int i = 0; i < kFeet; ++i) {
         const FootMotion foot = motion_.foot(t_mid, i);
@@ -146,18 +147,20 @@ void SimulatedRobot::measure(SensorSample& sample) {
         foot_velocity_[i] = foot.velocity + (foot.contact ? rolling : Vector3::Zero());
       }
     }
-    truth_.p_WF = p_WF;
+    p_WF_ = p_WF;
     q_ = q1;
     time_ = t1;
   }
   truth_.R_WB = R_WB(time_);
   truth_.p_WB = motion_.p_WB(time_);
   truth_.v_WB = v_WB(time_);
+  for (int i = 0; i < kFeet; ++i) truth_.p_BF_W[i] = p_WF_[i] - truth_.p_WB;
   truth_.gyro_bias += errors_.gyro_bias_walk * std::sqrt(kSamplePeriod) * gaussian3();
 
   const double averaging = 1.0 / std::sqrt(static_cast<double>(kImuSamples));
   sample.gyro = gyro + truth_.gyro_bias + averaging * errors_.gyro_noise * gaussian3();
-  sample.accelerometer = accelerometer + truth_.accelerometer_bias + averaging * errors_.accelerometer_noise * gaussian3();
+  sample.accelerometer =
+      accelerometer + truth_.accelerometer_bias + averaging * errors_.accelerometer_noise * gaussian3();
   sample.joint_position = q_ + encoder_offset_;
   sample.joint_velocity = (q_ - q_start) / kSamplePeriod;
   for (int j = 0; j < kMaxJoints; ++j) {

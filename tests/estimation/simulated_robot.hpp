@@ -1,6 +1,7 @@
 #pragma once
-// A robot whose trunk follows a given path and whose feet stand, roll, slide or swing as told: exact IMU, encoders and contact
-// switches, and, on request, the errors of real ones. It has no forces: it is kinematics, for the estimator's tests.
+// A robot whose trunk follows a given path and whose feet stand, roll, slide or swing as told: exact IMU, encoders and
+// contact switches, and, on request, the errors of real ones. It has no forces: it is kinematics, for the estimator's
+// tests.
 #include <array>
 #include <cstdint>
 #include <functional>
@@ -15,12 +16,13 @@ BaseEstimatorConfig recommended_config();
 
 /// A leg of 0.84 m, a tip of 2 cm.
 std::array<kinematics::LegGeometry, kFeet> test_legs();
-inline constexpr double kFootRadius = 0.02;    ///< m
+inline constexpr double kFootRadius = 0.02;     ///< m
 inline constexpr double kSamplePeriod = 0.005;  ///< s
 
 struct FootMotion {
   bool contact = true;
-  Vector3 velocity = Vector3::Zero();  ///< m/s, in W: of the sphere's lowest point in contact (slip), else of the tip (swing)
+  Vector3 velocity =
+      Vector3::Zero();  ///< m/s, in W: of the sphere's lowest point in contact (slip), else of the tip (swing)
 };
 
 struct Motion {
@@ -30,18 +32,18 @@ struct Motion {
   std::function<double(double)> pitch_sum = [](double) { return -0.25; };  ///< rad, of the last link in L
 };
 
-/// Standing at 0.72 m, swaying by a few centimetres and hundredths of a radian.
-Motion standing_motion();
+/// Standing with B 0.8 m up, swaying by centimetres and hundredths of a radian times `amplitude`. At rest at time 0.
+Motion standing_motion(double amplitude = 1.0);
 
 /// White noise is that of a 1 kHz sensor, of which a sample is the mean of 5.
 struct SensorErrors {
-  double gyro_noise = 0.0;           ///< rad/s
-  double gyro_bias = 0.0;            ///< rad/s, of random sign on each axis
-  double gyro_bias_walk = 0.0;       ///< rad/s/sqrt(s)
-  double accelerometer_noise = 0.0;  ///< m/s^2
-  double accelerometer_bias = 0.0;   ///< m/s^2, of random sign on each axis
-  double encoder_step = 0.0;         ///< rad
-  double encoder_offset = 0.0;       ///< rad, of random sign on each joint
+  double gyro_noise = 0.0;            ///< rad/s
+  double gyro_bias = 0.0;             ///< rad/s, of random sign on each axis
+  double gyro_bias_walk = 0.0;        ///< rad/s/sqrt(s)
+  double accelerometer_noise = 0.0;   ///< m/s^2
+  double accelerometer_bias = 0.0;    ///< m/s^2, of random sign on each axis
+  double encoder_step = 0.0;          ///< rad
+  double encoder_offset = 0.0;        ///< rad, of random sign on each joint
   double joint_velocity_noise = 0.0;  ///< rad/s
 };
 /// The simulator's defaults.
@@ -75,6 +77,7 @@ class SimulatedRobot {
   JointVector q_ = JointVector::Zero();
   JointVector encoder_offset_ = JointVector::Zero();
   BaseState truth_;
+  std::array<Vector3, kFeet> p_WF_{Vector3::Zero(), Vector3::Zero()};  ///< m, tips
   RobotState state_;
   double time_ = 0.0;
 };
