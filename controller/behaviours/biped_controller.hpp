@@ -29,7 +29,7 @@ class BipedController {
   struct Memory {
     std::int64_t run_id = 0;
     std::int64_t state_seq = 0;      ///< last state acted on
-    std::int64_t state_utime = 0;    ///< us
+    std::int64_t state_utime = -1;   ///< us
     UserCommand user_command;        ///< last plausible one
     double yaw = 0.0;                ///< rad, unwrapped
     bool standing = false;

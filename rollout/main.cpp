@@ -1,0 +1,153 @@
+// stance-rollout: simulator and controller in one process, without sockets, as fast as the machine allows. The same messages, in the
+// same order, as over LCM in lockstep: the same results, bit for bit.
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <iostream>
+#include <optional>
+#include <vector>
+
+#include "controller/compose.hpp"
+#include "controller/io/log.hpp"
+#include "controller/io/run_info.hpp"
+#include "controller/loop/wall_clock.hpp"
+#include "sim/simulator.hpp"
+
+namespace {
+
+using namespace stance;
+
+template <typename Lcm>
+class Encoded {
+ public:
+  io::Bytes operator()(const Lcm& message) {
+    bytes_.resize(static_cast<std::size_t>(message.getEncodedSize()));
+    message.encode(bytes_.data(), 0, static_cast<int>(bytes_.size()));
+    return bytes_;
+  }
+
+ private:
+  std::vector<std::uint8_t> bytes_;
+};
+
+template <typename Lcm>
+Lcm decoded(io::Bytes bytes) {
+  Lcm message;
+  message.decode(bytes.data(), 0, static_cast<int>(bytes.size()));
+  return message;
+}
+
+/// What a rollout tells on stdout.
+struct Summary {
+  double duration = 0.0;        ///< s, simulated
+  double wall = 0.0;            ///< s
+  bool fallen = false;
+  double max_tilt = 0.0;        ///< rad, of the trunk
+  std::int64_t qp_failures = 0;
+  std::uint64_t command_hash = io::kHashSeed;  ///< of every JOINT_COMMAND
+};
+
+void print(const Summary& s, const sim::Simulator& simulator, bool json) {
+  const auto& truth = simulator.truth();
+  const double speed = s.wall > 0.0 ? s.duration / s.wall : 0.0;
+  if (json) {
+    std::cout << "{\"duration_s\": " << s.duration << ", \"wall_s\": " << s.wall << ", \"times_real_time\": " << speed
+              << ", \"fallen\": " << (s.fallen ? "true" : "false") << ", \"max_tilt_rad\": " << s.max_tilt
+              << ", \"qp_failures\": " << s.qp_failures << ", \"p_WB\": [" << truth.p_WB[0] << ", " << truth.p_WB[1] << ", "
+              << truth.p_WB[2] << "], \"command_hash\": \"" << std::hex << s.command_hash << "\"}\n";
+    return;
+  }
+  std::cout << (s.fallen ? "fell at " : "stood for ") << s.duration << " s; largest tilt of the trunk "
+            << s.max_tilt * 180.0 / M_PI << " deg; " << s.qp_failures << " failed QPs; " << speed
+            << " times real time; joint commands " << std::hex << s.command_hash << "\n";
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app{"Stance's simulator and controller in one process: a scenario as fast as the machine allows."};
+  app.set_version_flag("--version", STANCE_VERSION);
+  std::string robot_name, scenario_name, engine, plant_name, log_file;
+  double duration = 0.0;
+  std::uint64_t seed = 1;
+  std::int64_t run_id = 1;
+  bool json = false;
+  app.add_option("--robot", robot_name, "robots/<robot>")->required();
+  app.add_option("--scenario", scenario_name, "A name below sim/scenarios/<robot>/, or a .yaml file")->required();
+  app.add_option("--duration", duration, "Seconds in place of the scenario's")->check(CLI::PositiveNumber);
+  app.add_option("--seed", seed, "Of the sensors' noise")->capture_default_str();
+  app.add_option("--run-id", run_id, "Stands in every message")->capture_default_str();
+  app.add_option("--solver", engine, "Engine of the force QP in place of the robot's own");
+  app.add_option("--plant", plant_name, "multibody or single-body, in place of the scenario's");
+  app.add_option("--log", log_file, "Write every message to this LCM log");
+  app.add_flag("--json", json, "The summary as JSON");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+
+  try {
+    auto robot = config::load_robot(config::share_directory() / "robots", robot_name);
+    if (!engine.empty()) robot.yaml_text = with_engine(robot.yaml_text, engine);
+    const sim::Scenario scenario = sim::load_scenario(robot_name, scenario_name);
+    sim::SimulatorOptions options;
+    options.seed = seed;
+    options.run_id = run_id;
+    if (!plant_name.empty()) {
+      options.plant = sim::plant_from_name(plant_name);
+      if (!options.plant) throw std::invalid_argument("--plant is '" + plant_name + "', but must be multibody or single-body");
+    }
+    sim::Simulator simulator(robot, scenario, options);
+    loop::Ticker ticker(compose(robot));
+
+    std::optional<io::LogWriter> log;
+    if (!log_file.empty()) log.emplace(log_file);
+    const auto record = [&](const char* channel, io::Bytes bytes) {
+      if (log) log->write(simulator.state().utime, channel, bytes);
+    };
+    std::string arguments;
+    for (int i = 1; i < argc; ++i) arguments += (i > 1 ? " " : "") + std::string(argv[i]);
+    record(io::channel::kRunInfo, io::encode(io::RunInfo{robot.name, arguments, robot.urdf_text, robot.yaml_text}));
+
+    Encoded<stance_msgs::robot_state_t> state;
+    Encoded<stance_msgs::user_command_t> user_command;
+    Encoded<stance_msgs::truth_t> truth;
+    loop::NoClock clock;
+    Summary summary;
+    const auto periods = static_cast<std::int64_t>(std::llround((duration > 0.0 ? duration : scenario.duration) / kControlPeriod));
+    const auto start = std::chrono::steady_clock::now();
+    for (std::int64_t k = 0; k < periods && !simulator.fallen(); ++k) {
+      if (const auto* command = simulator.user_command()) {
+        const io::Bytes bytes = user_command(*command);
+        record(io::channel::kUserCommand, bytes);
+        static_cast<void>(ticker.offer_user_command(bytes));
+      }
+      const io::Bytes bytes = state(simulator.state());
+      record(io::channel::kRobotState, bytes);
+      static_cast<void>(ticker.offer_state(bytes));
+      ticker.tick(1, clock);
+      record(io::channel::kForcePlan, ticker.plan().bytes());
+      record(io::channel::kJointCommand, ticker.command().bytes());
+      record(io::channel::kTrace, ticker.trace().bytes());
+      simulator.accept(decoded<stance_msgs::force_plan_t>(ticker.plan().bytes()));
+      simulator.accept(decoded<stance_msgs::joint_command_t>(ticker.command().bytes()));
+      simulator.advance();
+      if (log) record("TRUTH", truth(simulator.truth()));
+
+      const auto& q = simulator.truth().quat_WB;
+      summary.max_tilt = std::max(summary.max_tilt, std::acos(std::clamp(1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]), -1.0, 1.0)));
+      summary.command_hash = io::hash(ticker.command().bytes(), summary.command_hash);
+    }
+    summary.wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    summary.duration = simulator.time();
+    summary.fallen = simulator.fallen();
+    summary.qp_failures = ticker.output().trace.fault_count[static_cast<std::size_t>(Fault::kQpFailed)];
+    print(summary, simulator, json);
+    return summary.fallen ? 1 : 0;
+  } catch (const std::exception& error) {
+    std::cerr << "stance-rollout: " << error.what() << "\n";
+    return 2;
+  }
+}
