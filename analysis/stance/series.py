@@ -1,0 +1,148 @@
+"""Messages as columns: what the metrics and the plots read. Nothing here opens a file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+from .messages import OPERATOR_CHANNELS
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = npt.NDArray[Any]
+Floats = npt.NDArray[np.float64]
+Integers = npt.NDArray[np.int64]
+
+
+class Messages(Protocol):
+    """The messages of one channel, sorted by (utime, seq). n is their number."""
+
+    @property
+    def channel(self) -> str: ...
+
+    @property
+    def received(self) -> Integers:
+        """us, wall clock of the logger, shape (n,)"""
+        ...
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """the fields, as in lcmtypes/"""
+        ...
+
+    def __len__(self) -> int: ...
+
+    def field(self, name: str) -> Array:
+        """One field, native byte order, shape (n, *dimensions of the field)."""
+        ...
+
+    def frame(self) -> pd.DataFrame:
+        """A column per scalar; array fields as name_0, name_0_2, ... in row-major order; `tag` is left out."""
+        ...
+
+
+@dataclass(frozen=True)
+class RunInfo:
+    """What a program said of itself: run_info_t."""
+
+    program: str
+    version: str
+    source: str
+    build: str
+    robot: str
+    options: str
+    seed: int
+    urdf: str
+    configuration: str
+    scenario: str
+    input_hash: str
+
+
+@dataclass
+class Run:
+    """One run of a robot: the messages of one ROBOT_STATE.run_id. Times are seconds from its first ROBOT_STATE."""
+
+    run_id: int
+    start: int
+    """us, utime of the first ROBOT_STATE"""
+    channels: Mapping[str, Messages]
+    simulator: RunInfo | None = None
+    controller: RunInfo | None = None
+    name: str = ""
+    """where it came from, for titles"""
+    _time: dict[str, Floats] = field(default_factory=dict, repr=False)
+
+    def __contains__(self, channel: str) -> bool:
+        return channel in self.channels and len(self.channels[channel]) > 0
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self.channels)
+
+    def count(self, channel: str) -> int:
+        return len(self.channels[channel]) if channel in self.channels else 0
+
+    def field(self, channel: str, name: str) -> Array:
+        """Shape (n, *dimensions). Raises KeyError where the run has no such channel or field."""
+        return self.channels[channel].field(name)
+
+    def frame(self, channel: str) -> pd.DataFrame:
+        """The channel's columns with `t` [s] first. Raises KeyError where the run has no such channel."""
+        import pandas as pd
+
+        return pd.concat([pd.Series(self.time(channel), name="t"), self.channels[channel].frame()], axis=1)
+
+    @property
+    def duration(self) -> float:
+        """s, from the first to the last ROBOT_STATE"""
+        state = self.field("ROBOT_STATE", "utime")
+        return float(state[-1] - state[0]) * 1e-6 if len(state) else 0.0
+
+    def time(self, channel: str) -> Floats:
+        """s since the run's start, shape (n,).
+
+        By utime where the sender shares the robot's clock. CONTROLLER_TIMING is stamped by the wall clock, so it takes
+        the time of the trace of the same tick; what an operator sent is placed by when the logger received it.
+        """
+        if channel not in self._time:
+            self._time[channel] = self._time_of(channel)
+        return self._time[channel]
+
+    def _time_of(self, channel: str) -> Floats:
+        utime = self.field(channel, "utime")
+        own = (utime - self.start) * 1e-6
+        if channel == "CONTROLLER_TIMING" and "CONTROLLER_TRACE" in self:
+            rows = match(self._ticks("CONTROLLER_TIMING"), self._ticks("CONTROLLER_TRACE"))
+            trace = self.time("CONTROLLER_TRACE")
+            known = rows >= 0
+            if known.any():
+                position = np.arange(len(own), dtype=float)
+                return np.asarray(np.interp(position, position[known], trace[rows[known]]))
+        elif channel in OPERATOR_CHANNELS or (len(own) and (own.min() < -1.0 or own.max() > self.duration + 1.0)):
+            received, at = self.channels["ROBOT_STATE"].received, self.time("ROBOT_STATE")
+            order = np.argsort(received, kind="stable")
+            return np.asarray(np.interp(self.channels[channel].received, received[order], at[order]))
+        return np.asarray(own)
+
+    def _ticks(self, channel: str) -> Integers:
+        """A number for each tick that stays unique when the controller is started again within the run."""
+        return self.session(channel) * (1 << 40) + self.field(channel, "seq")
+
+    def session(self, channel: str) -> Integers:
+        """0, 1, ... : how often the sender had been started again before each message, shape (n,)."""
+        seq = self.field(channel, "seq")
+        return np.concatenate([[0], np.cumsum(np.diff(seq) < 0)]).astype(np.int64)[: len(seq)]
+
+
+def match(wanted: Array, keys: Array) -> Integers:
+    """For each of `wanted`, the first index into `keys` that holds it, or -1. Shape of `wanted`."""
+    if not len(keys):
+        return np.full(len(wanted), -1, np.int64)
+    order = np.argsort(keys, kind="stable")
+    at = np.searchsorted(keys[order], wanted)
+    found = order[np.minimum(at, len(keys) - 1)]
+    return np.where(keys[found] == wanted, found, -1).astype(np.int64)

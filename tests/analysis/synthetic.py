@@ -1,0 +1,256 @@
+"""Logs with known content: a biped that stands and takes pushes, written without any of the C++ programs.
+
+Not a simulation: a base that sways and swings back after a push, with joints, forces and messages that agree with it.
+"""
+
+from __future__ import annotations
+
+import struct
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+from stance.events import SYNC
+from stance.messages import message_type
+from stance.urdf import Robot, parse_urdf, rotation_from_rpy, transform
+
+URDF = (Path(__file__).parents[2] / "robots/biped/biped.urdf").read_text()
+CONFIGURATION = """\
+robot: biped
+urdf: biped.urdf
+joints: [q0_l, q1_l, q2_l, q3_l, q0_r, q1_r, q2_r, q3_r]
+feet: [tarsus_l, tarsus_r]
+controller:
+  force_qp:
+    friction: 0.55
+"""
+FRICTION = 0.55
+RUN_ID = 4242
+PERIOD = 0.01  # s
+GRAVITY = 9.81
+MASS = 13.2
+START = 1_000_000  # us, the simulated clock at the first state
+WALL = 1_700_000_000_000_000  # us, the logger's clock at the first state
+
+
+def encode_event(number: int, time: int, channel: str, data: bytes) -> bytes:
+    """One event as lcm-logger writes it."""
+    name = channel.encode()
+    return struct.pack(">Iqqii", SYNC, number, time, len(name), len(data)) + name + data
+
+
+def encode_log(events: list[tuple[int, str, bytes]]) -> bytes:
+    """A log's bytes from (receive time us, channel, payload)."""
+    return b"".join(encode_event(number, *event) for number, event in enumerate(events))
+
+
+def records(type_name: str, count: int) -> npt.NDArray[np.void]:
+    """Zeroed encoded messages of a fixed-size type, with its fingerprint."""
+    found = message_type(type_name)
+    assert found.dtype is not None
+    result = np.zeros(count, found.dtype)
+    result["fingerprint"] = np.frombuffer(found.fingerprint, "V8")
+    return result
+
+
+def leg_ik(robot: Robot, side: str, p_BF: npt.NDArray[np.float64], pitch_sum: float = -0.25) -> npt.NDArray[np.float64]:
+    """Joints (4,) of the leg with its foot at p_BF; the last link's angle is `pitch_sum`."""
+    hip = next(joint for joint in robot.joints if joint.name == f"q0_{side}")
+    x, y, z = hip.T_parent[:3, :3].T @ (p_BF - hip.T_parent[:3, 3])
+    q0 = np.arctan2(z, y)
+    down = np.hypot(y, z) - 0.08
+    # In the leg's plane: angle a from down towards +x is minus the pitch.
+    ankle = np.array([x, down]) - 0.24 * np.array([-np.sin(pitch_sum), np.cos(pitch_sum)])
+    distance = np.linalg.norm(ankle)
+    knee = np.arccos(np.clip((distance**2 - 2 * 0.26**2) / (2 * 0.26**2), -1, 1))
+    q1 = np.arctan2(-ankle[0], ankle[1]) - knee / 2
+    return np.array([q0, q1, knee, pitch_sum - q1 - knee])
+
+
+@dataclass
+class Synthetic:
+    """What to write. Every list of times is in seconds from the run's start."""
+
+    duration: float = 4.0
+    pushes: list[tuple[float, float, tuple[float, float, float]]] = field(
+        default_factory=lambda: [(1.5, 0.1, (5.0, 0.0, 0.0)), (2.5, 0.1, (0.0, 30.0, 0.0))]
+    )
+    """(start, duration s, force N in W)"""
+    run_id: int = RUN_ID
+    seed: int = 1
+    realtime: bool = True
+    late_ticks: dict[int, float] = field(default_factory=dict)
+    """tick → how late it woke, us; above a period it counts as missed"""
+    qp_failures: tuple[int, ...] = ()
+    fall_at: float | None = None
+    refused: int = 0
+    estimator_drift: float = 0.0
+    """m/s, along x"""
+
+    def messages(self) -> dict[str, npt.NDArray[np.void]]:
+        """channel → encoded messages, in order."""
+        n = round(self.duration / PERIOD) + 1
+        t = np.arange(n) * PERIOD
+        rng = np.random.default_rng(self.seed)
+        robot = parse_urdf(URDF)
+        force = np.zeros((n, 3))
+        sway = np.sin(2 * np.pi * np.outer(t, [0.4, 0.3, 0.2])) * np.array([0.002, 0.003, 0.001])
+        acceleration = np.zeros((n, 3))
+        for start, length, push in self.pushes:
+            force[(t > start + 1e-9) & (t <= start + length + 1e-9)] = push
+            since = np.maximum(t - start, 0.0)
+            amplitude = np.array(push) * length / MASS * 0.25
+            sway += amplitude * (np.exp(-4.0 * since) * np.sin(6.0 * since))[:, None]
+        acceleration = np.gradient(np.gradient(sway, PERIOD, axis=0), PERIOD, axis=0)
+        roll, pitch = -1.2 * sway[:, 1], 1.2 * sway[:, 0]
+        p_WB = sway + np.array([0.0, 0.0, 0.8176])
+        fallen = np.zeros(n, np.int8)
+        if self.fall_at is not None:
+            since = np.maximum(t - self.fall_at, 0.0)
+            pitch = pitch + np.minimum(4.0 * since**2, 1.5)
+            p_WB[:, 2] -= np.minimum(2.0 * since**2, 0.4)
+            fallen = (t > self.fall_at + 0.4).astype(np.int8)
+        half = np.stack([roll, pitch], axis=1) / 2
+        (cos_roll, cos_pitch), (sin_roll, sin_pitch) = np.cos(half).T, np.sin(half).T
+        quat_WB = np.stack(
+            [cos_roll * cos_pitch, sin_roll * cos_pitch, cos_roll * sin_pitch, -sin_roll * sin_pitch], axis=1
+        )
+        p_WF = np.array([[0.03, 0.10, 0.02], [0.03, -0.10, 0.02]])
+        q, p_WC = np.zeros((n, 8)), np.zeros((n, 3))
+        for i in range(n):
+            R_WB = rotation_from_rpy(roll[i], pitch[i], 0.0)
+            for leg, side in enumerate("lr"):
+                q[i, 4 * leg : 4 * leg + 4] = leg_ik(robot, side, R_WB.T @ (p_WF[leg] - p_WB[i]))
+            p_WC[i] = robot.center_of_mass(q[i], transform(R_WB, p_WB[i]))
+        v_WB, v_WC, qd = (np.gradient(values, PERIOD, axis=0) for values in (p_WB, p_WC, q))
+        ground = MASS * (acceleration + np.array([0.0, 0.0, GRAVITY])) - force
+        share = np.clip(0.5 + (p_WC[:, 1] - 0.05 * ground[:, 1] / 10) / 0.2, 0.1, 0.9)
+        planned = np.stack([share[:, None] * ground, (1 - share)[:, None] * ground], axis=1)
+        planned[..., :2] = np.clip(planned[..., :2], -0.5 * planned[..., 2:], 0.5 * planned[..., 2:])
+        contact_force = planned + rng.normal(0.0, 0.4, planned.shape)
+        torque = 8.0 * np.sin(q) + 0.3 * rng.normal(size=q.shape)
+
+        seq = np.arange(1, n + 1)
+        utime = START + np.round(t * 1e6).astype(np.int64)
+
+        def stamped(type_name: str, count: int = n) -> npt.NDArray[np.void]:
+            result = records(type_name, count)
+            result["utime"], result["seq"], result["run_id"] = utime[:count], seq[:count], self.run_id
+            return result
+
+        state = stamped("robot_state_t")
+        state["num_joints"], state["num_contacts"], state["sample_period"] = 8, 2, PERIOD / 2
+        state["joint_position"] = q[:, None, :] + rng.normal(0, 1e-4, (n, 2, 8))
+        state["joint_velocity"] = qd[:, None, :] + rng.normal(0, 1e-2, (n, 2, 8))
+        state["accelerometer"][..., 2] = GRAVITY
+        state["contact_switch"][..., :2] = 1
+        state["joint_torque"] = torque
+
+        truth = stamped("truth_t")
+        truth["num_joints"], truth["num_contacts"] = 8, 2
+        truth["p_WB"], truth["quat_WB"], truth["v_WB"] = p_WB, quat_WB, v_WB
+        truth["p_WC"], truth["v_WC"], truth["push_W"] = p_WC, v_WC, force
+        truth["joint_position"], truth["joint_velocity"], truth["joint_torque"] = q, qd, torque
+        truth["p_WF"][:, :2], truth["f_F_W"][:, :2] = p_WF, contact_force
+        truth["plan_seq"] = np.maximum(seq - 1, 0)
+        truth["force_error"][1:, :2] = contact_force[1:] - planned[:-1]
+        truth["fallen"] = fallen
+        truth["refused_stale"] = np.minimum(np.arange(n), self.refused)
+
+        command = stamped("joint_command_t")
+        command["state_seq"], command["num_joints"] = seq, 8
+        command["position"], command["velocity"], command["feedforward_torque"] = q, qd, torque
+        command["kp"], command["kd"] = 40.0, 2.0
+
+        plan = stamped("force_plan_t")
+        plan["state_seq"], plan["num_contacts"], plan["num_stages"] = seq, 2, 10
+        plan["stage_duration"][:, :10] = PERIOD
+        plan["contact"][:, :10, :2] = 1
+        plan["p_WF"][:, :2], plan["force"][:, :10, :2] = p_WF, planned[:, None]
+        plan["p_WC"][:, :10] = p_WC[:, None]
+        plan["effort"] = np.sqrt(0.1 * (planned**2).sum(axis=(1, 2)))
+
+        trace = stamped("controller_trace_t")
+        trace["state_seq"], trace["state_is_new"], trace["periods"] = seq, 1, 1
+        drift = np.zeros((n, 3))
+        drift[:, 0] = self.estimator_drift * t
+        trace["p_WB"] = p_WB + drift + rng.normal(0, 2e-4, (n, 3))
+        trace["quat_WB"], trace["v_WB"] = quat_WB, v_WB + rng.normal(0, 2e-3, (n, 3))
+        trace["p_WF"][:, :2], trace["contact"][:, :2] = p_WF, 1
+        trace["x"][:, 0], trace["x"][:, 1] = roll, pitch
+        trace["x"][:, 3:6], trace["x"][:, 9:12] = p_WC + drift, v_WC
+        trace["x_ref"][:, 3:6] = p_WC[0]
+        trace["qp_status"] = 1
+        trace["qp_iterations"] = 25 * rng.integers(1, 4, n)
+        trace["qp_primal_residual"] = 10 ** rng.uniform(-9, -6, n)
+        trace["qp_dual_residual"] = 10 ** rng.uniform(-8, -6, n)
+        trace["effort"] = plan["effort"]
+        if self.fall_at is not None:
+            down = t > self.fall_at + 0.4
+            trace["faults"], trace["safety"] = down << 4, np.where(down, 2, 0)
+            trace["fault_count"][:, 4] = np.cumsum(down)
+        for tick in self.qp_failures:
+            trace["qp_status"][tick] = 2
+            trace["faults"][tick] |= 1 << 3
+            trace["fault_count"][tick:, 3] += 1
+            trace["safety"][tick] = 1
+
+        timing = stamped("controller_timing_t")
+        timing["utime"] = 77_000_000 + np.round(t * 1e6).astype(np.int64)  # the wall's clock, not the simulator's
+        timing["state_seq"] = seq
+        stage = np.array([4.0, 2.0, 12.0, 6.0, 9.0, 160.0, 14.0, 3.0, 5.0]) * rng.lognormal(0.0, 0.25, (n, 9))
+        timing["stage_us"], timing["tick_us"] = stage, stage.sum(axis=1) + 3.0
+        timing["cpu_us"] = stage.sum(axis=1)
+        if self.realtime:
+            latency = rng.lognormal(np.log(45.0), 0.5, n)
+            for tick, late in self.late_ticks.items():
+                latency[tick] = late
+            timing["wake_latency_us"] = latency
+            timing["period_us"] = 1e6 * PERIOD + np.diff(latency, prepend=latency[0])
+            timing["slack_us"] = 1e6 * PERIOD - latency - timing["tick_us"]
+            timing["state_age_us"] = 600.0 + latency
+            timing["missed_ticks"] = np.cumsum(np.floor(latency / (1e6 * PERIOD)))
+        else:
+            timing["period_us"] = 300.0
+        return {
+            "ROBOT_STATE": state,
+            "TRUTH": truth,
+            "JOINT_COMMAND": command,
+            "FORCE_PLAN": plan,
+            "CONTROLLER_TRACE": trace,
+            "CONTROLLER_TIMING": timing,
+        }
+
+    def run_info(self, program: str, utime: int, seq: int) -> bytes:
+        message = message_type("run_info_t").python_class()
+        message.utime, message.seq, message.run_id, message.seed = utime, seq, self.run_id, self.seed
+        message.program, message.version, message.source, message.build = program, "0.1.0", "0123abc", "g++ 12 Release"
+        message.robot, message.scenario = "biped", "scenario: stand\n"
+        message.options = f"--robot biped {'--realtime' if self.realtime else '--lockstep'}"
+        message.urdf, message.configuration, message.input_hash = URDF, CONFIGURATION, "00c0ffee"
+        message.tag = bytes(16)
+        return bytes(message.encode())
+
+    def events(self) -> list[tuple[int, str, bytes]]:
+        """(receive time us, channel, payload), in order of time."""
+        result: list[tuple[int, str, bytes]] = [(WALL - 5000, "LCM_SELF_TEST", b"lcm self test")]
+        for second in range(int(self.duration) + 1):
+            utime = START + second * 1_000_000
+            received = WALL + second * 1_000_000 - 100
+            result.append((received, "RUN_INFO_SIMULATOR", self.run_info("stance-sim", utime, second + 1)))
+            result.append((received, "RUN_INFO_CONTROLLER", self.run_info("stance-controller", utime, second + 1)))
+        for place, (channel, messages) in enumerate(self.messages().items()):
+            for i, record in enumerate(messages):
+                result.append((WALL + round(i * PERIOD * 1e6) + 100 * place, channel, record.tobytes()))
+        command = records("user_command_t", 1)
+        command["utime"], command["seq"] = 5, 1
+        result.append((WALL + 500_000, "USER_COMMAND", command[0].tobytes()))
+        return sorted(result, key=lambda event: event[0])
+
+    def log(self) -> bytes:
+        return encode_log(self.events())
+
+    def write(self, path: Path) -> Path:
+        path.write_bytes(self.log())
+        return path
