@@ -1,0 +1,177 @@
+#include "sim/scenario.hpp"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <filesystem>
+#include <sstream>
+#include <utility>
+
+#include "controller/config/robot_description.hpp"
+#include "sim/world.hpp"
+
+namespace stance::sim {
+namespace {
+
+using config::StrictYaml;
+
+std::string to_text(double value) {
+  std::ostringstream text;
+  text << value;
+  return text.str();
+}
+
+double number_in(StrictYaml& yaml, const std::string& key, double lowest, double highest) {
+  const double value = yaml.number(key);
+  if (value < lowest || value > highest) {
+    yaml.fail(key, "is " + to_text(value) + ", but must be in [" + to_text(lowest) + ", " + to_text(highest) + "]");
+  }
+  return value;
+}
+
+Vector3 vector(StrictYaml& yaml, const std::string& key) {
+  const std::vector<double> v = yaml.numbers(key, 3);
+  return {v[0], v[1], v[2]};
+}
+
+/// A time [s] as a whole number of `step` [s].
+int whole_steps(StrictYaml& yaml, const std::string& key, double step, int most) {
+  const double value = number_in(yaml, key, 0.0, most * step);
+  const double steps = std::round(value / step);
+  if (std::abs(value - steps * step) > 1e-9) {
+    yaml.fail(key, "is " + to_text(value) + " s, but must be a multiple of " + to_text(step) + " s");
+  }
+  return static_cast<int>(steps);
+}
+
+SensorNoise noise_from(StrictYaml yaml) {
+  constexpr double most = 10.0;  // of any of them: a bound that only an error of units passes
+  SensorNoise noise;
+  noise.gyro_white = number_in(yaml, "gyro_white", 0.0, most);
+  noise.gyro_bias = number_in(yaml, "gyro_bias", 0.0, most);
+  noise.gyro_bias_walk = number_in(yaml, "gyro_bias_walk", 0.0, most);
+  noise.accelerometer_white = number_in(yaml, "accelerometer_white", 0.0, most);
+  noise.accelerometer_bias = number_in(yaml, "accelerometer_bias", 0.0, most);
+  noise.joint_position_resolution = number_in(yaml, "joint_position_resolution", 0.0, most);
+  noise.joint_position_offset = number_in(yaml, "joint_position_offset", 0.0, most);
+  noise.joint_velocity_white = number_in(yaml, "joint_velocity_white", 0.0, most);
+  yaml.finish();
+  return noise;
+}
+
+SensorModel sensors_from(StrictYaml yaml, bool noise_is_word) {
+  SensorModel sensors;
+  sensors.delay_steps = whole_steps(yaml, "delay", kPhysicsStep, kMaxSensorDelaySteps);
+  sensors.accelerometer_limit = number_in(yaml, "accelerometer_limit", kGravity, 1e6);
+  sensors.contact_threshold = number_in(yaml, "contact_threshold", 0.0, 1e6);
+  sensors.contact_delay_steps = whole_steps(yaml, "contact_delay", kPhysicsStep, kMaxSensorDelaySteps);
+  if (!noise_is_word) {
+    sensors.noise = noise_from(yaml.mapping("noise"));
+  } else if (yaml.text("noise") != "none") {
+    yaml.fail("noise", "is '" + yaml.text("noise") + "', but must be none or a mapping");
+  }
+  yaml.finish();
+  return sensors;
+}
+
+InitialState initial_from(StrictYaml yaml) {
+  InitialState initial;
+  initial.foot_clearance = number_in(yaml, "foot_clearance", -0.005, 10.0);
+  initial.roll_pitch_yaw = vector(yaml, "roll_pitch_yaw");
+  initial.velocity_W = vector(yaml, "velocity_W");
+  initial.angular_velocity_W = vector(yaml, "angular_velocity_W");
+  yaml.finish();
+  return initial;
+}
+
+ScheduledPush push_from(StrictYaml yaml) {
+  ScheduledPush push;
+  push.time = number_in(yaml, "time", 0.0, 1e6);
+  push.duration = number_in(yaml, "duration", 1e-6, 1e6);
+  push.force_W = vector(yaml, "force_W");
+  push.point_B = vector(yaml, "point_B");
+  yaml.finish();
+  return push;
+}
+
+ScheduledCommand command_from(StrictYaml yaml) {
+  constexpr std::array<std::pair<const char*, Behaviour>, 5> names{{{"stand", Behaviour::kStand},
+                                                                    {"walk", Behaviour::kWalk},
+                                                                    {"lie-down", Behaviour::kLieDown},
+                                                                    {"track", Behaviour::kTrack},
+                                                                    {"catch", Behaviour::kCatch}}};
+  ScheduledCommand command;
+  command.period = whole_steps(yaml, "time", kControlPeriod, 100'000'000);
+  const std::string name = yaml.text("behaviour");
+  const auto* known = std::find_if(names.begin(), names.end(), [&](const auto& entry) { return entry.first == name; });
+  if (known == names.end()) {
+    yaml.fail("behaviour", "is '" + name + "', but must be stand, walk, lie-down, track or catch");
+  }
+  command.behaviour = known->second;
+  const std::vector<double> velocity = yaml.numbers("velocity", 2);
+  command.velocity = {velocity[0], velocity[1]};
+  command.yaw_rate = yaml.number("yaw_rate");
+  command.height_offset = yaml.number("height_offset");
+  yaml.finish();
+  return command;
+}
+
+}  // namespace
+
+std::optional<Plant> plant_from_name(const std::string& name) {
+  if (name == "multibody") return Plant::kMultibody;
+  if (name == "single-body") return Plant::kSingleBody;
+  return std::nullopt;
+}
+
+Scenario scenario_from_text(const std::string& text, const std::string& name) {
+  StrictYaml yaml = StrictYaml::parse(text, name);
+  Scenario scenario;
+  scenario.text = text;
+  scenario.robot = yaml.text("robot");
+  const std::string plant = yaml.text("plant");
+  if (!plant_from_name(plant)) yaml.fail("plant", "is '" + plant + "', but must be multibody or single-body");
+  scenario.plant = *plant_from_name(plant);
+  scenario.duration = number_in(yaml, "duration", kControlPeriod, 1e6);
+  scenario.friction = number_in(yaml, "friction", 0.0, 10.0);
+  scenario.command_delay_steps = whole_steps(yaml, "command_latency", kPhysicsStep, kMaxCommandDelaySteps);
+  StrictYaml factors = yaml.mapping("mass_factor");
+  scenario.trunk_mass_factor = number_in(factors, "trunk", 0.1, 10.0);
+  scenario.leg_mass_factor = number_in(factors, "legs", 0.1, 10.0);
+  factors.finish();
+  scenario.initial = initial_from(yaml.mapping("initial_state"));
+  const YAML::Node noise = YAML::Load(text)["sensors"]["noise"];
+  scenario.sensors = sensors_from(yaml.mapping("sensors"), noise && noise.IsScalar());
+  for (StrictYaml& push : yaml.mappings("pushes")) scenario.pushes.push_back(push_from(push));
+  for (StrictYaml& command : yaml.mappings("commands")) scenario.commands.push_back(command_from(command));
+  yaml.finish();
+
+  const auto earlier = [](const auto& a, const auto& b) { return a.time < b.time; };
+  if (!std::is_sorted(scenario.pushes.begin(), scenario.pushes.end(), earlier)) {
+    yaml.fail("pushes", "must stand in the order of their times");
+  }
+  const auto not_before = [](const auto& a, const auto& b) { return a.period >= b.period; };
+  if (std::adjacent_find(scenario.commands.begin(), scenario.commands.end(), not_before) != scenario.commands.end()) {
+    yaml.fail("commands", "must stand in the order of their times, one at a time");
+  }
+  return scenario;
+}
+
+Scenario load_scenario(const std::string& robot, const std::string& scenario) {
+  std::filesystem::path file = scenario;
+  if (file.extension() != ".yaml") {
+    file = config::share_directory() / "sim" / "scenarios" / robot / (scenario + ".yaml");
+    if (!std::filesystem::exists(file)) {
+      throw config::ConfigError("no scenario '" + scenario + "' of robot " + robot + ": " + file.string() +
+                                " does not exist");
+    }
+  }
+  Scenario loaded = scenario_from_text(config::read_text(file), file.filename().string());
+  if (loaded.robot != robot) {
+    throw config::ConfigError(file.filename().string() + ": robot is '" + loaded.robot + "', but the run is of '" +
+                              robot + "'");
+  }
+  return loaded;
+}
+
+}  // namespace stance::sim

@@ -1,0 +1,276 @@
+#include "sim/simulator.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace stance::sim {
+namespace {
+
+using stance_msgs::force_plan_t;
+using stance_msgs::joint_command_t;
+using stance_msgs::push_t;
+using stance_msgs::truth_t;
+
+constexpr std::int64_t kPeriodUs = 10'000;
+static_assert(kControlPeriod == static_cast<double>(kPeriodUs) * 1e-6);
+static_assert(kMaxContacts == force_plan_t::MAX_CONTACTS && kMaxContacts == truth_t::MAX_CONTACTS &&
+              kMaxJoints == truth_t::MAX_JOINTS && kMaxJoints == joint_command_t::MAX_JOINTS);
+
+void copy(const Vector3& from, double (&to)[3]) noexcept {
+  for (int i = 0; i < 3; ++i) to[i] = from[i];
+}
+
+Vector3 vector(const double (&v)[3]) noexcept { return {v[0], v[1], v[2]}; }
+
+rigid_body::Model with_mass_factors(rigid_body::Model model, double trunk, double legs) {
+  model.total_mass = 0.0;
+  for (int i = 0; i < model.num_bodies(); ++i) {
+    auto& body = model.bodies[static_cast<std::size_t>(i)];
+    const double factor = i == 0 ? trunk : legs;
+    body.mass *= factor;
+    body.inertia *= factor;
+    model.total_mass += body.mass;
+  }
+  return model;
+}
+
+/// The nominal pose, the lowest foot at its clearance and W's origin amid the feet.
+rigid_body::State initial_state(const config::RobotDescription& robot, const InitialState& initial) {
+  rigid_body::State state;
+  state.q = robot.nominal_joint_position;
+  if (robot.feet.empty()) return state;
+  state.R_WB = math::rotation_from_rpy(initial.roll_pitch_yaw);
+  state.v_WB = initial.velocity_W;
+  state.w_WB_W = initial.angular_velocity_W;
+  const ContactVectors tips = foot_tips(robot.model, robot.feet, state);
+  Vector3 mean = Vector3::Zero();
+  double lowest = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < robot.feet.size(); ++i) {
+    mean += tips[i] / static_cast<double>(robot.feet.size());
+    lowest = std::min(lowest, tips[i].z() - robot.feet[i].radius);
+  }
+  state.p_WB = {-mean.x(), -mean.y(), initial.foot_clearance - lowest};
+  return state;
+}
+
+}  // namespace
+
+Simulator::Sums Simulator::no_sums() noexcept {
+  Sums sums;
+  sums.foot_force.fill(Vector3::Zero());
+  return sums;
+}
+
+template <typename Message>
+void Simulator::Delayed<Message>::put(const Message& message, std::int64_t now, std::int64_t delay) noexcept {
+  last_accepted_step = now;
+  if (num_waiting > 0 && waiting[num_waiting - 1].effect_step == now + delay) --num_waiting;
+  waiting[num_waiting] = {message, now + delay};
+  ++num_waiting;
+}
+
+template <typename Message>
+void Simulator::Delayed<Message>::promote(std::int64_t now) noexcept {
+  while (num_waiting > 0 && waiting[0].effect_step <= now) {
+    current = waiting[0].message;
+    has_current = true;
+    std::move(waiting.begin() + 1, waiting.begin() + static_cast<std::ptrdiff_t>(num_waiting), waiting.begin());
+    --num_waiting;
+  }
+}
+
+template <typename Message>
+bool Simulator::Delayed<Message>::valid(std::int64_t now, std::int64_t timeout_steps) const noexcept {
+  return has_current && now - last_accepted_step < timeout_steps;
+}
+
+Simulator::Simulator(const config::RobotDescription& robot, const Scenario& scenario, const SimulatorOptions& options)
+    : robot_(robot),
+      scenario_(scenario),
+      options_(options),
+      num_contacts_(robot.feet.size()),
+      drives_(drive_config(robot)),
+      timeout_steps_(std::lround(drives_.command_timeout / kPhysicsStep)),
+      gate_(options.run_id, robot.model.num_joints, timeout_steps_ / kStepsPerPeriod) {
+  robot_.model = with_mass_factors(robot_.model, scenario_.trunk_mass_factor, scenario_.leg_mass_factor);
+  if (num_contacts_ > 0) {
+    config::StrictYaml safety =
+        config::StrictYaml::parse(robot_.yaml_text, robot_.name + ".yaml").mapping("controller").mapping("safety");
+    min_upright_ = safety.number("min_upright");
+    min_height_ = safety.number("min_height");
+  }
+  WorldSetup setup;
+  setup.model = robot_.model;
+  setup.feet = robot_.feet;
+  setup.shapes = collision_shapes_from_urdf(robot_.urdf_text, robot_.model);
+  setup.friction = scenario_.friction;
+  setup.floating = num_contacts_ > 0;
+  setup.initial = initial_state(robot_, scenario_.initial);
+  plant_.emplace<World>(setup);
+
+  ContactVectors weight;
+  weight.fill(Vector3::Zero());
+  if (scenario_.initial.foot_clearance <= 0.0) {
+    for (std::size_t i = 0; i < num_contacts_; ++i) {
+      weight[i].z() = robot_.model.total_mass * kGravity / static_cast<double>(num_contacts_);
+    }
+  }
+  sensors_.emplace(scenario_.sensors, robot_.model.num_joints, static_cast<int>(num_contacts_), setup.initial, weight,
+                   options_.seed);
+  write_messages(no_sums());
+}
+
+Acceptance Simulator::accept(const joint_command_t& command) noexcept {
+  const Acceptance acceptance = gate_.judge(command, state_.seq);
+  if (acceptance == Acceptance::kAccepted) commands_.put(command, step_, scenario_.command_delay_steps);
+  return acceptance;
+}
+
+bool Simulator::accept(const force_plan_t& plan) noexcept {
+  if (plan.run_id != options_.run_id || plan.num_contacts != static_cast<int>(num_contacts_) || plan.num_stages < 1) {
+    return false;
+  }
+  if (plan.state_seq > state_.seq || plan.state_seq < newest_plan_state_seq_ ||
+      (plan.state_seq == newest_plan_state_seq_ && plan.seq <= newest_plan_seq_)) {
+    return false;
+  }
+  for (std::size_t i = 0; i < num_contacts_; ++i) {
+    if (!vector(plan.force[0][i]).allFinite() || !vector(plan.p_WF[i]).allFinite()) return false;
+  }
+  newest_plan_seq_ = plan.seq;
+  newest_plan_state_seq_ = plan.state_seq;
+  plans_.put(plan, step_, scenario_.command_delay_steps);
+  return true;
+}
+
+bool Simulator::accept(const push_t& push) noexcept {
+  const Vector3 force = vector(push.force_W);
+  const Vector3 point = vector(push.point_B);
+  if (push.run_id != 0 && push.run_id != options_.run_id) return false;
+  if (!force.allFinite() || !point.allFinite() || !std::isfinite(push.duration) || push.duration <= 0.0) return false;
+  const auto over = [now = time()](const ScheduledPush& entry) { return entry.time + entry.duration <= now; };
+  auto* const free = std::find_if(requested_pushes_.begin(), requested_pushes_.end(), over);
+  if (free == requested_pushes_.end()) return false;
+  *free = {time(), push.duration, force, point};
+  return true;
+}
+
+Wrench Simulator::push_wrench(const rigid_body::State& state, double now) const noexcept {
+  Wrench wrench;
+  const auto add = [&](const ScheduledPush& push) {
+    // The part of this step that the push covers, so that its impulse is exact whatever its times.
+    const double covered = std::min(now + kPhysicsStep, push.time + push.duration) - std::max(now, push.time);
+    if (covered <= 0.0) return;
+    const Vector3 force = push.force_W * (covered / kPhysicsStep);
+    wrench.force += force;
+    wrench.moment += (state.R_WB * push.point_B).cross(force);
+  };
+  for (const ScheduledPush& push : scenario_.pushes) add(push);
+  for (const ScheduledPush& push : requested_pushes_) add(push);
+  return wrench;
+}
+
+void Simulator::step(Sums& sums) {
+  World& world = std::get<World>(plant_);
+  const rigid_body::State before = world.state();
+  commands_.promote(step_);
+  plans_.promote(step_);
+  drives_damped_ = !commands_.valid(step_, timeout_steps_);
+  const JointVector torque = drives_damped_ ? damping_torque(robot_.model, drives_.damping, before.qd)
+                                            : drive_torque(robot_.model, commands_.current, before.q, before.qd);
+  const Wrench push = push_wrench(before, static_cast<double>(step_) * kPhysicsStep);
+  world.step(torque, push);
+  sensors_->step(before, world.state(), world.foot_force_W());
+  sums.torque += torque / kStepsPerPeriod;
+  sums.push += push.force / kStepsPerPeriod;
+  for (std::size_t i = 0; i < num_contacts_; ++i) sums.foot_force[i] += world.foot_force_W()[i] / kStepsPerPeriod;
+  body_was_on_ground_ = body_was_on_ground_ || world.body_on_ground();
+  ++step_;
+}
+
+void Simulator::advance() {
+  Sums sums = no_sums();
+  for (int i = 0; i < kStepsPerPeriod; ++i) step(sums);
+  ++period_;
+  write_messages(sums);
+}
+
+bool Simulator::has_fallen() const noexcept {
+  if (num_contacts_ == 0) return false;
+  if (truth_.fallen != 0 || body_was_on_ground_) return true;
+  double lowest = truth_.p_WF[0][2];
+  for (std::size_t i = 1; i < num_contacts_; ++i) lowest = std::min(lowest, truth_.p_WF[i][2]);
+  const World& world = std::get<World>(plant_);
+  // Written so that a state that is not a number has fallen, too.
+  return !(world.state().R_WB(2, 2) >= min_upright_ && world.state().p_WB.z() - lowest >= min_height_);
+}
+
+void Simulator::write_messages(const Sums& sums) noexcept {
+  const World& world = std::get<World>(plant_);
+  const rigid_body::State& now = world.state();
+  const std::int64_t utime = options_.start_utime + period_ * kPeriodUs;
+  const std::int64_t seq = period_ + 1;
+
+  state_.utime = utime;
+  state_.seq = seq;
+  state_.run_id = options_.run_id;
+  sensors_->read(state_);
+  for (int i = 0; i < kMaxJoints; ++i) state_.joint_torque[i] = sums.torque[i];
+
+  const Mechanics mechanics = world.mechanics();
+  const ContactVectors tips = world.foot_tips_W();
+  const Quaternion rotation(now.R_WB);
+  const bool has_plan = plans_.valid(step_ - 1, timeout_steps_);
+  truth_.utime = utime;
+  truth_.seq = seq;
+  truth_.run_id = options_.run_id;
+  truth_.num_joints = robot_.model.num_joints;
+  truth_.num_contacts = static_cast<std::int32_t>(num_contacts_);
+  copy(now.p_WB, truth_.p_WB);
+  truth_.quat_WB[0] = rotation.w();
+  truth_.quat_WB[1] = rotation.x();
+  truth_.quat_WB[2] = rotation.y();
+  truth_.quat_WB[3] = rotation.z();
+  copy(now.v_WB, truth_.v_WB);
+  copy(now.w_WB_W, truth_.w_WB_W);
+  copy(mechanics.p_WC, truth_.p_WC);
+  copy(mechanics.v_WC, truth_.v_WC);
+  copy(mechanics.L_C_W, truth_.L_C_W);
+  truth_.energy = mechanics.energy;
+  for (int i = 0; i < kMaxJoints; ++i) {
+    truth_.joint_position[i] = now.q[i];
+    truth_.joint_velocity[i] = now.qd[i];
+    truth_.joint_torque[i] = sums.torque[i];
+  }
+  truth_.plan_seq = has_plan ? plans_.current.seq : 0;
+  for (std::size_t i = 0; i < num_contacts_; ++i) {
+    const Vector3 planned = has_plan ? vector(plans_.current.force[0][i]) : sums.foot_force[i];
+    copy(tips[i], truth_.p_WF[i]);
+    copy(sums.foot_force[i], truth_.f_F_W[i]);
+    copy(sums.foot_force[i] - planned, truth_.force_error[i]);
+  }
+  copy(sums.push, truth_.push_W);
+  truth_.drives_damped = drives_damped_ ? 1 : 0;
+  truth_.fallen = has_fallen() ? 1 : 0;
+  truth_.refused_stale = refused().stale;
+  truth_.refused_not_finite = refused().not_finite;
+  truth_.refused_order = refused().order;
+  truth_.refused_run = refused().run;
+
+  user_command_due_ = next_command_ < scenario_.commands.size() && scenario_.commands[next_command_].period == period_;
+  if (user_command_due_) {
+    const ScheduledCommand& command = scenario_.commands[next_command_];
+    ++next_command_;
+    user_command_.utime = utime;
+    user_command_.seq = static_cast<std::int64_t>(next_command_);
+    user_command_.run_id = options_.run_id;
+    user_command_.behaviour = static_cast<std::int8_t>(command.behaviour);
+    user_command_.velocity[0] = command.velocity.x();
+    user_command_.velocity[1] = command.velocity.y();
+    user_command_.yaw_rate = command.yaw_rate;
+    user_command_.height_offset = command.height_offset;
+  }
+}
+
+}  // namespace stance::sim

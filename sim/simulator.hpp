@@ -1,0 +1,118 @@
+#pragma once
+// A run: the plant, its drives and sensors, and the scenario's events, in control periods. It speaks the messages of
+// lcmtypes/ and knows neither sockets nor clocks: the same scenario, seed and accepted messages give the same bits.
+//
+// At the instant t_k = k kControlPeriod: state() and truth() are of t_k; what is accepted then takes effect
+// `command_latency` of the scenario after t_k; advance() goes on to t_(k+1).
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <stance_msgs/force_plan_t.hpp>
+#include <stance_msgs/joint_command_t.hpp>
+#include <stance_msgs/push_t.hpp>
+#include <stance_msgs/robot_state_t.hpp>
+#include <stance_msgs/truth_t.hpp>
+#include <stance_msgs/user_command_t.hpp>
+#include <variant>
+#include <vector>
+
+#include "controller/config/robot_description.hpp"
+#include "sim/drives.hpp"
+#include "sim/scenario.hpp"
+#include "sim/sensors.hpp"
+#include "sim/world.hpp"
+
+namespace stance::sim {
+
+struct SimulatorOptions {
+  std::uint64_t seed = 1;  ///< of the sensors' noise
+  std::int64_t run_id = 1;
+  std::int64_t start_utime = 0;  ///< us, stamp of t_0
+  std::optional<Plant> plant;    ///< in place of the scenario's
+};
+
+class Simulator {
+ public:
+  /// Throws config::ConfigError and std::invalid_argument. All memory but Bullet's own is taken here.
+  Simulator(const config::RobotDescription& robot, const Scenario& scenario, const SimulatorOptions& options);
+
+  const stance_msgs::robot_state_t& state() const { return state_; }
+  const stance_msgs::truth_t& truth() const { return truth_; }
+  /// The scenario's command that is due at this instant; null where there is none.
+  const stance_msgs::user_command_t* user_command() const { return user_command_due_ ? &user_command_ : nullptr; }
+
+  Acceptance accept(const stance_msgs::joint_command_t& command) noexcept;
+  /// False where the plan is not of this run, of another robot's size, not finite, or older than one before it.
+  bool accept(const stance_msgs::force_plan_t& plan) noexcept;
+  /// Starts now. False where it is not finite, not of this run, or too many are under way.
+  bool accept(const stance_msgs::push_t& push) noexcept;
+
+  /// One control period.
+  void advance();
+
+  const RefusalCounts& refused() const { return gate_.refused(); }
+  bool fallen() const { return truth_.fallen != 0; }
+  double time() const { return static_cast<double>(period_) * kControlPeriod; }  ///< s, since t_0
+
+ private:
+  /// What the controller sent, from its acceptance to its effect and after: the newest that is in effect, and those on
+  /// their way.
+  template <typename Message>
+  struct Delayed {
+    struct Entry {
+      Message message;
+      std::int64_t effect_step = 0;
+    };
+    // One message a period can be on its way (a second in one period replaces the first), and the one in effect.
+    static constexpr std::size_t kCapacity = kMaxCommandDelaySteps / kStepsPerPeriod + 2;
+    std::array<Entry, kCapacity> waiting{};
+    std::size_t num_waiting = 0;
+    Message current;
+    bool has_current = false;
+    std::int64_t last_accepted_step = 0;
+
+    void put(const Message& message, std::int64_t now, std::int64_t delay) noexcept;
+    void promote(std::int64_t now) noexcept;
+    bool valid(std::int64_t now, std::int64_t timeout_steps) const noexcept;
+  };
+  struct Sums {
+    JointVector torque = JointVector::Zero();
+    ContactVectors foot_force{};
+    Vector3 push = Vector3::Zero();
+  };
+
+  static Sums no_sums() noexcept;
+  void step(Sums& sums);
+  Wrench push_wrench(const rigid_body::State& state, double time) const noexcept;
+  bool has_fallen() const noexcept;
+  void write_messages(const Sums& sums) noexcept;
+
+  config::RobotDescription robot_;
+  Scenario scenario_;
+  SimulatorOptions options_;
+  std::size_t num_contacts_;
+  DriveConfig drives_;
+  std::int64_t timeout_steps_;
+  double min_upright_ = 0.0;  // fallen below: z component of the trunk's z axis
+  double min_height_ = 0.0;   // m, of the trunk over its lowest foot
+  std::variant<std::monostate, World> plant_;
+  std::optional<Sensors> sensors_;
+  CommandGate gate_;
+  Delayed<stance_msgs::joint_command_t> commands_;
+  Delayed<stance_msgs::force_plan_t> plans_;
+  std::int64_t newest_plan_seq_ = 0;
+  std::int64_t newest_plan_state_seq_ = 0;
+  std::array<ScheduledPush, 16> requested_pushes_{};  // a finished one is free: duration 0
+
+  std::int64_t period_ = 0;  // control periods since t_0
+  std::int64_t step_ = 0;    // physics steps since t_0
+  bool drives_damped_ = false;
+  bool body_was_on_ground_ = false;
+  std::size_t next_command_ = 0;
+  bool user_command_due_ = false;
+  stance_msgs::robot_state_t state_{};
+  stance_msgs::truth_t truth_{};
+  stance_msgs::user_command_t user_command_{};
+};
+
+}  // namespace stance::sim

@@ -1,0 +1,82 @@
+#pragma once
+// The robot in Bullet: one Featherstone multibody over flat ground, double precision, stepped at 1 kHz.
+//
+// Settings that matter: no damping of Bullet's own, gyroscopic term on, exact friction cone, 50 iterations without
+// early exit, no softness, no restitution, never asleep. The joints' ranges are stops of the physics. Legs collide with
+// each other and the trunk.
+#include <memory>
+#include <vector>
+
+#include "controller/rigid_body/dynamics.hpp"
+#include "controller/rigid_body/model.hpp"
+#include "sim/shapes.hpp"
+
+namespace stance::sim {
+
+inline constexpr int kStepsPerPeriod = 10;  ///< physics and drive steps in a control period
+inline constexpr double kPhysicsStep = kControlPeriod / kStepsPerPeriod;  ///< s
+
+/// Force on the base at B's origin and moment about it, in W.
+struct Wrench {
+  Vector3 force = Vector3::Zero();   ///< N
+  Vector3 moment = Vector3::Zero();  ///< N m
+};
+
+/// Whole-robot quantities that no sensor sees.
+struct Mechanics {
+  Vector3 p_WC = Vector3::Zero();   ///< m
+  Vector3 v_WC = Vector3::Zero();   ///< m/s
+  Vector3 L_C_W = Vector3::Zero();  ///< kg m^2/s
+  double energy = 0.0;              ///< J, kinetic, and potential over the ground
+};
+
+/// Of the tree in this state.
+Mechanics mechanics(const rigid_body::Model& model, const rigid_body::State& state) noexcept;
+
+/// Foot tips (the spheres' centres) of the tree in this state, in W [m].
+ContactVectors foot_tips(const rigid_body::Model& model, const std::vector<rigid_body::Foot>& feet,
+                         const rigid_body::State& state) noexcept;
+
+struct WorldSetup {
+  rigid_body::Model model;
+  std::vector<rigid_body::Foot> feet;  ///< at most kMaxContacts
+  std::vector<CollisionShape> shapes;
+  double friction = 0.0;  ///< between the ground and the robot
+  bool floating = true;   ///< false: the base is fixed where it starts
+  rigid_body::State initial;
+};
+
+class World {
+ public:
+  explicit World(const WorldSetup& setup);
+  ~World();
+  World(const World&) = delete;
+  World& operator=(const World&) = delete;
+
+  /// One step of kPhysicsStep under joint torques [N m] and a wrench on the base.
+  void step(const JointVector& torque, const Wrench& push);
+
+  const rigid_body::State& state() const { return state_; }
+  Mechanics mechanics() const noexcept { return sim::mechanics(model_, state_); }
+  /// Foot tips (the spheres' centres) in W [m].
+  ContactVectors foot_tips_W() const noexcept { return foot_tips(model_, feet_, state_); }
+  /// Forces of the ground on the feet in W, mean over the last step [N].
+  const ContactVectors& foot_force_W() const { return foot_force_W_; }
+  /// Did a body other than a foot's bear on the ground in the last step?
+  bool body_on_ground() const { return body_on_ground_; }
+
+ private:
+  struct Bullet;
+  void read_state();
+  void read_contacts();
+
+  rigid_body::Model model_;
+  std::vector<rigid_body::Foot> feet_;
+  std::unique_ptr<Bullet> bullet_;
+  Matrix3 R_BI_ = Matrix3::Identity();  // the base's principal axes
+  rigid_body::State state_;
+  ContactVectors foot_force_W_{};
+  bool body_on_ground_ = false;
+};
+
+}  // namespace stance::sim
