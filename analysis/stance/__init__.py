@@ -1,0 +1,12 @@
+"""Replay, analysis and command line of the Stance robot controller.
+
+    from stance.log import Log
+    from stance.metrics import measure
+    run = Log.open("run.lcmlog").run()
+    measure(run).trunk.tilt_max_deg
+
+Modules: `log` reads, `series` holds, `metrics` and `check` judge, `plots` and `picture` draw, `report` writes; `run`,
+`replay` and `network` speak LCM; `cli` is the command `stance`.
+"""
+
+__version__ = "0.1.0"

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 CHUNK_BYTES = 256 << 10  # of payloads decoded at a time: what fits a core's cache
+RUN_INFO_TYPE = "run_info_t"  # repeated every second, byte for byte, so that any part of a log explains itself
 NOT_COLUMNS = ("tag",)  # fields that a DataFrame leaves out
 
 Keys = Mapping[str, Integers]
@@ -116,7 +117,7 @@ class LogReport:
                 found.append(
                     f"{channel.name}: {channel.conflicting} messages differ from another of the same utime and seq"
                 )
-            if channel.duplicates:
+            if channel.duplicates and channel.type_name != RUN_INFO_TYPE:
                 found.append(f"{channel.name}: {channel.duplicates} messages were sent again, byte for byte")
             if channel.out_of_order:
                 found.append(f"{channel.name}: {channel.out_of_order} messages arrived late and were sorted")
@@ -305,14 +306,26 @@ class Log:
             part = messages.take(rows)
             if len(part):
                 chosen[name] = part
+        infos = {
+            name: _run_info(chosen.get(name) or self._heard_before(name, last))
+            for name in ("RUN_INFO_SIMULATOR", "RUN_INFO_CONTROLLER")
+        }
         return Run(
             run_id=run_id,
             start=int(own.field("utime")[0]),
             channels=chosen,
-            simulator=_run_info(chosen.get("RUN_INFO_SIMULATOR")),
-            controller=_run_info(chosen.get("RUN_INFO_CONTROLLER") or self.channels.get("RUN_INFO_CONTROLLER")),
+            simulator=infos["RUN_INFO_SIMULATOR"],
+            controller=infos["RUN_INFO_CONTROLLER"],
             name=self.path.name,
         )
+
+    def _heard_before(self, channel: str, received: int) -> LogMessages | None:
+        """The newest message of a sender that knows no run ids, as of a wall time [us]."""
+        messages = self.channels.get(channel)
+        if messages is None:
+            return None
+        rows = np.flatnonzero(~np.isin(self._keys[channel]["run_id"], self.run_ids) & (messages.received <= received))
+        return messages.take(rows[np.argmax(messages.received[rows])][None]) if len(rows) else None
 
     # ---- reading ---------------------------------------------------------------------------------------------------
 
