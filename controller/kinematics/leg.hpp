@@ -1,8 +1,8 @@
 #pragma once
 // The 4-joint leg of document 000 in closed form: eqs 1-18 and the inverse kinematics.
 //
-// Leg frame L: x forward, y down along the hanging leg, z = x cross y, i.e. left. q0 rolls about x, q1..q3 pitch about
-// z.
+// Leg frame L: x forward, y down along the hanging leg, z = x cross y, i.e. left. Joint q0 rolls about x; q1..q3
+// pitch about z.
 //   T_L0 = Rx(q0) trans(0, L0, 0)        T_(i-1)i = Rz(q_i) trans(0, L_i, 0), i = 1..3            (eqs 1-4, 10-12)
 //   com_0 = Rx(q0) (0, l0, 0) in L       com_i = Rz(q_i) (0, l_i, 0) in frame i-1                  (eqs 5-8)
 //   foot  = T_L0 T_01 T_12 T_23 (0, 0, 0, 1)                                                      (eqs 9, 12)

@@ -131,16 +131,15 @@ void mass_matrix(const Model& model, const State& state, MatrixNu& M) noexcept {
   // Joints on different branches do not feel each other.
   M.setZero(6 + n, 6 + n);
   M.topRows<6>() = H;
-  M.bottomLeftCorner(n, 6) = H.rightCols(n).transpose();
   for (int j = 0; j < n; ++j) {
     for (int b = j + 1; b > 0; b = model.joints[b - 1].parent) {
       const int i = b - 1;
       const Vector3& axis = kinematics.axis_W[i];
       const Vector3 v = (kinematics.p_W[b] - kinematics.p_W[0]).cross(axis);
       M(6 + i, 6 + j) = axis.dot(H.col(6 + j).head<3>()) + v.dot(H.col(6 + j).tail<3>());
-      M(6 + j, 6 + i) = M(6 + i, 6 + j);
     }
   }
+  M.triangularView<Eigen::StrictlyLower>() = M.transpose();
 }
 
 void gravity_torques(const Model& model, const State& state, VectorNu& tau) noexcept {

@@ -5,7 +5,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <cmath>
 #include <stdexcept>
 
 #include "controller/math/se3.hpp"
@@ -42,15 +41,16 @@ class ParserMessages : public console_bridge::OutputHandler {
 urdf::ModelInterfaceSharedPtr parse(const std::string& urdf_text) {
   ParserMessages messages;
   urdf::ModelInterfaceSharedPtr robot;
-  std::string thrown;
+  std::string reason;
   try {
     robot = urdf::parseURDF(urdf_text);
   } catch (const std::exception& error) {
-    thrown = error.what();
+    reason = error.what();
   }
-  if (!robot || !robot->getRoot()) {
-    const std::string text = messages.text() + thrown;
-    fail("document", "does not parse", (text.empty() ? "no reason given" : text) + " (mend this element)");
+  // The parser goes on after some errors, with an element half read.
+  reason += messages.text();
+  if (!robot || !robot->getRoot() || !reason.empty()) {
+    fail("document", "does not parse", (reason.empty() ? "no root link" : reason) + " (mend this element)");
   }
   return robot;
 }
@@ -74,13 +74,13 @@ Carrier carrier_of(const urdf::Link& link) {
   return carrier;
 }
 
-bool positive_definite(const Matrix3& m) { return m.allFinite() && Eigen::LLT<Matrix3>(m).info() == Eigen::Success; }
+bool positive_definite(const Matrix3& m) { return Eigen::LLT<Matrix3>(m).info() == Eigen::Success; }
 
 /// Adds the link's inertial, with the link placed at T in the body's frame.
 void add_inertial(const urdf::Link& link, const RigidTransform& T, Body& body) {
   if (!link.inertial) return;
   const urdf::Inertial& inertial = *link.inertial;
-  if (!(inertial.mass > 0.0) || !std::isfinite(inertial.mass)) {
+  if (!(inertial.mass > 0.0)) {
     fail(quoted("link", link.name), "has the mass " + std::to_string(inertial.mass),
          "give a positive <mass>, or no <inertial> to a link without mass on a fixed joint");
   }

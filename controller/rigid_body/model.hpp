@@ -50,14 +50,16 @@ struct Model {
   int body_index(const std::string& name) const;  ///< throws std::invalid_argument that names the link
 };
 
-/// Reads URDF text. Fixed joints are merged into their parents. `joint_order` names every moving joint once.
-/// Throws std::invalid_argument, naming the element and the remedy, for: malformed XML, a joint that is missing from or
-/// unknown to the order, a child before its parent, a joint type other than revolute and fixed, a non-positive mass, an
-/// inertia that is not positive definite, missing limits, more than kMaxJoints joints.
+/// Reads URDF text. Fixed joints are merged into their parents. `joint_order` names every moving joint once. The base
+/// needs its mass too, also where nothing will move it. Not for two threads at once: the parser's message handler is
+/// global. Throws std::invalid_argument, naming the element and the remedy, for: malformed XML, a joint that is missing
+/// from or unknown to the order, a child before its parent, a joint type other than revolute and fixed, a non-positive
+/// mass, an inertia that is not positive definite, missing or empty limits, a zero axis, <mimic>, more than kMaxJoints
+/// joints.
 Model model_from_urdf(const std::string& urdf_text, const std::vector<std::string>& joint_order);
 
-/// The point feet named by `links`, in that order. Throws std::invalid_argument where a link has no sphere collision
-/// shape.
+/// The point feet named by `links`, in that order; a link on fixed joints is found in the body that carries it. Throws
+/// std::invalid_argument where a link is unknown or has no sphere collision shape.
 std::vector<Foot> feet_from_urdf(const std::string& urdf_text, const Model& model,
                                  const std::vector<std::string>& links);
 
