@@ -1,0 +1,94 @@
+// Nothing that a control tick calls allocates. malloc itself is interposed: Eigen's own guard is off in release builds.
+#include <atomic>
+#include <catch2/catch_test_macros.hpp>
+#include <cstddef>
+#include <vector>
+
+#include "tests/rigid_body/biped_fixture.hpp"
+
+namespace {
+std::atomic<long> allocations{0};
+}
+
+// glibc's own entry points, to which the interposed ones pass on.
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* block, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+void* malloc(std::size_t size) noexcept {
+  ++allocations;
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t count, std::size_t size) noexcept {
+  ++allocations;
+  return __libc_calloc(count, size);
+}
+void* realloc(void* block, std::size_t size) noexcept {
+  ++allocations;
+  return __libc_realloc(block, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+int posix_memalign(void** block, std::size_t alignment, std::size_t size) noexcept {
+  ++allocations;
+  *block = __libc_memalign(alignment, size);
+  return 0;
+}
+}
+
+using namespace stance;
+using namespace stance::test;
+using namespace stance::rigid_body;
+
+TEST_CASE("InterposedMallocSeesAllocations") {
+  const long before = allocations;
+  const volatile std::size_t size = 1000;  // so that the compiler cannot do without
+  const std::vector<double> block(size);
+  CHECK(block.size() == size);
+  CHECK(allocations > before);
+}
+
+TEST_CASE("KinematicsAndDynamicsDoNotAllocate") {
+  const Biped biped;
+  Random random(5);
+  const State state = random_state(biped.model, random);
+  const VectorNu nud = random_acceleration(biped.model, random);
+  const kinematics::LegVector q = state.q.head<4>();
+
+  const long before = allocations;
+  Kinematics kinematics;
+  forward_kinematics(biped.model, state, kinematics);
+  Jacobian J;
+  geometric_jacobian(biped.model, state, kinematics, 4, kinematics.com_W[4], J);
+  VectorNu tau;
+  inverse_dynamics(biped.model, state, nud, tau);
+  gravity_torques(biped.model, state, tau);
+  MatrixNu M;
+  mass_matrix(biped.model, state, M);
+  Centroidal c;
+  centroidal(biped.model, kinematics, c);
+  Matrix6Nu A_G;
+  centroidal_momentum_matrix(biped.model, state, kinematics, A_G);
+  // Products, as callers write them.
+  const VectorNu momentum = M * velocity_of(biped.model, state);
+  const MatrixNu square = M * M.transpose() - J.transpose() * A_G;
+  for (const std::array<bool, 2> held : {std::array{true, true}, std::array{true, false}}) {
+    (void)kinematics::biped_effective_inertia(biped.model, biped.feet, state, kinematics, held);
+  }
+  kinematics::LegKinematics leg;
+  kinematics::leg_kinematics(biped.legs[0], q, leg);
+  Vector3 p_BF;
+  Eigen::Matrix<double, 3, 4> J_BF;
+  kinematics::foot_in_base(biped.legs[0], q, p_BF, J_BF);
+  kinematics::LegVector inverse;
+  (void)kinematics::leg_ik(biped.legs[0], leg.foot, -0.25, inverse);
+  const kinematics::LegVector null = kinematics::null_direction(leg.J_foot);
+  const long after = allocations;
+
+  CHECK(after == before);
+  CHECK((momentum.allFinite() && square.allFinite() && null.allFinite()));
+}
