@@ -107,17 +107,20 @@ Simulator::Simulator(const config::RobotDescription& robot, const Scenario& scen
   setup.friction = scenario_.friction;
   setup.floating = num_contacts_ > 0;
   setup.initial = initial_state(robot_, scenario_.initial);
-  plant_.emplace<World>(setup);
-
-  ContactVectors weight;
-  weight.fill(Vector3::Zero());
-  if (scenario_.initial.foot_clearance <= 0.0) {
-    for (std::size_t i = 0; i < num_contacts_; ++i) {
-      weight[i].z() = robot_.model.total_mass * kGravity / static_cast<double>(num_contacts_);
-    }
+  if (options_.plant.value_or(scenario_.plant) == Plant::kMultibody) {
+    world_.emplace(setup);
+  } else {
+    single_body_.emplace(setup);
   }
-  sensors_.emplace(scenario_.sensors, robot_.model.num_joints, static_cast<int>(num_contacts_), setup.initial, weight,
-                   options_.seed);
+
+  resting_force_W_.fill(Vector3::Zero());
+  for (std::size_t i = 0; i < num_contacts_; ++i) {
+    resting_force_W_[i].z() = robot_.model.total_mass * kGravity / static_cast<double>(num_contacts_);
+  }
+  ContactVectors first_force = resting_force_W_;
+  if (scenario_.initial.foot_clearance > 0.0) first_force.fill(Vector3::Zero());
+  sensors_.emplace(scenario_.sensors, robot_.model.num_joints, static_cast<int>(num_contacts_), setup.initial,
+                   first_force, options_.seed);
   write_messages(no_sums());
 }
 
@@ -171,21 +174,40 @@ Wrench Simulator::push_wrench(const rigid_body::State& state, double now) const 
   return wrench;
 }
 
+AppliedForces Simulator::planned_forces() const noexcept {
+  AppliedForces forces;
+  forces.force_W.fill(Vector3::Zero());
+  forces.p_WF.fill(Vector3::Zero());
+  if (!plans_.valid(step_, timeout_steps_)) return forces;
+  for (std::size_t i = 0; i < num_contacts_; ++i) {
+    forces.force_W[i] = vector(plans_.current.force[0][i]);
+    forces.p_WF[i] = vector(plans_.current.p_WF[i]);
+  }
+  return forces;
+}
+
 void Simulator::step(Sums& sums) {
-  World& world = std::get<World>(plant_);
-  const rigid_body::State before = world.state();
+  const auto state = [](const auto& plant) { return plant.state(); };
+  const rigid_body::State before = plant(state);
   commands_.promote(step_);
   plans_.promote(step_);
   drives_damped_ = !commands_.valid(step_, timeout_steps_);
-  const JointVector torque = drives_damped_ ? damping_torque(robot_.model, drives_.damping, before.qd)
-                                            : drive_torque(robot_.model, commands_.current, before.q, before.qd);
   const Wrench push = push_wrench(before, static_cast<double>(step_) * kPhysicsStep);
-  world.step(torque, push);
-  sensors_->step(before, world.state(), world.foot_force_W());
+  JointVector torque = JointVector::Zero();
+  if (world_) {
+    torque = drives_damped_ ? damping_torque(robot_.model, drives_.damping, before.qd)
+                            : drive_torque(robot_.model, commands_.current, before.q, before.qd);
+    world_->step(torque, push);
+  } else {
+    single_body_->step(planned_forces(), push);
+  }
+  const ContactVectors foot_force = plant([](const auto& p) { return p.foot_force_W(); });
+  // The single body's feet are on the ground whatever the plan asks of them.
+  sensors_->step(before, plant(state), world_ ? foot_force : resting_force_W_);
+  body_was_on_ground_ = body_was_on_ground_ || plant([](const auto& p) { return p.body_on_ground(); });
   sums.torque += torque / kStepsPerPeriod;
   sums.push += push.force / kStepsPerPeriod;
-  for (std::size_t i = 0; i < num_contacts_; ++i) sums.foot_force[i] += world.foot_force_W()[i] / kStepsPerPeriod;
-  body_was_on_ground_ = body_was_on_ground_ || world.body_on_ground();
+  for (std::size_t i = 0; i < num_contacts_; ++i) sums.foot_force[i] += foot_force[i] / kStepsPerPeriod;
   ++step_;
 }
 
@@ -201,14 +223,13 @@ bool Simulator::has_fallen() const noexcept {
   if (truth_.fallen != 0 || body_was_on_ground_) return true;
   double lowest = truth_.p_WF[0][2];
   for (std::size_t i = 1; i < num_contacts_; ++i) lowest = std::min(lowest, truth_.p_WF[i][2]);
-  const World& world = std::get<World>(plant_);
+  const rigid_body::State now = plant([](const auto& p) { return p.state(); });
   // Written so that a state that is not a number has fallen, too.
-  return !(world.state().R_WB(2, 2) >= min_upright_ && world.state().p_WB.z() - lowest >= min_height_);
+  return !(now.R_WB(2, 2) >= min_upright_ && now.p_WB.z() - lowest >= min_height_);
 }
 
 void Simulator::write_messages(const Sums& sums) noexcept {
-  const World& world = std::get<World>(plant_);
-  const rigid_body::State& now = world.state();
+  const rigid_body::State now = plant([](const auto& p) { return p.state(); });
   const std::int64_t utime = options_.start_utime + period_ * kPeriodUs;
   const std::int64_t seq = period_ + 1;
 
@@ -218,8 +239,8 @@ void Simulator::write_messages(const Sums& sums) noexcept {
   sensors_->read(state_);
   for (int i = 0; i < kMaxJoints; ++i) state_.joint_torque[i] = sums.torque[i];
 
-  const Mechanics mechanics = world.mechanics();
-  const ContactVectors tips = world.foot_tips_W();
+  const Mechanics mechanics = plant([](const auto& p) { return p.mechanics(); });
+  const ContactVectors tips = plant([](const auto& p) { return p.foot_tips_W(); });
   const Quaternion rotation(now.R_WB);
   const bool has_plan = plans_.valid(step_ - 1, timeout_steps_);
   truth_.utime = utime;

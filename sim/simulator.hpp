@@ -13,13 +13,13 @@
 #include <stance_msgs/robot_state_t.hpp>
 #include <stance_msgs/truth_t.hpp>
 #include <stance_msgs/user_command_t.hpp>
-#include <variant>
 #include <vector>
 
 #include "controller/config/robot_description.hpp"
 #include "sim/drives.hpp"
 #include "sim/scenario.hpp"
 #include "sim/sensors.hpp"
+#include "sim/single_body.hpp"
 #include "sim/world.hpp"
 
 namespace stance::sim {
@@ -81,6 +81,12 @@ class Simulator {
     Vector3 push = Vector3::Zero();
   };
 
+  /// What `read` gives of the plant.
+  template <typename Read>
+  auto plant(Read read) const {
+    return world_ ? read(*world_) : read(*single_body_);
+  }
+  AppliedForces planned_forces() const noexcept;
   static Sums no_sums() noexcept;
   void step(Sums& sums);
   Wrench push_wrench(const rigid_body::State& state, double time) const noexcept;
@@ -93,10 +99,12 @@ class Simulator {
   std::size_t num_contacts_;
   DriveConfig drives_;
   std::int64_t timeout_steps_;
-  double min_upright_ = 0.0;  // fallen below: z component of the trunk's z axis
-  double min_height_ = 0.0;   // m, of the trunk over its lowest foot
-  std::variant<std::monostate, World> plant_;
+  double min_upright_ = 0.0;    // fallen below: z component of the trunk's z axis
+  double min_height_ = 0.0;     // m, of the trunk over its lowest foot
+  std::optional<World> world_;  // one of these two is the plant
+  std::optional<SingleBody> single_body_;
   std::optional<Sensors> sensors_;
+  ContactVectors resting_force_W_{};  // N, the weight shared by the feet
   CommandGate gate_;
   Delayed<stance_msgs::joint_command_t> commands_;
   Delayed<stance_msgs::force_plan_t> plans_;

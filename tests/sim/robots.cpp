@@ -1,0 +1,44 @@
+#include "tests/sim/robots.hpp"
+
+namespace stance::sim::test {
+
+config::RobotDescription biped() {
+  const auto robots = config::share_directory() / "robots";
+  std::string yaml = config::read_text(robots / "biped/biped.yaml");
+  if (yaml.find("\ndrives:") == std::string::npos) {
+    yaml += "\ndrives:\n  damping: [2, 2, 2, 2, 2, 2, 2, 2]\n  command_timeout: 0.05\n";
+  }
+  return config::robot_from_texts(yaml, config::read_text(robots / "biped/biped.urdf"));
+}
+
+WorldSetup biped_world(double height) {
+  const config::RobotDescription robot = biped();
+  WorldSetup setup;
+  setup.model = robot.model;
+  setup.feet = robot.feet;
+  setup.shapes = collision_shapes_from_urdf(robot.urdf_text, robot.model);
+  setup.friction = 0.7;
+  setup.initial.q = robot.nominal_joint_position;
+  setup.initial.p_WB.z() = height;
+  return setup;
+}
+
+Scenario biped_scenario(const std::string& name) { return load_scenario("biped", name); }
+
+stance_msgs::joint_command_t hold_command(const config::RobotDescription& robot, const Simulator& simulator, double kp,
+                                          double kd) {
+  stance_msgs::joint_command_t command{};
+  command.seq = simulator.state().seq;
+  command.state_seq = simulator.state().seq;
+  command.run_id = simulator.state().run_id;
+  command.mode = stance_msgs::joint_command_t::ACTIVE;
+  command.num_joints = robot.model.num_joints;
+  for (int i = 0; i < robot.model.num_joints; ++i) {
+    command.position[i] = robot.nominal_joint_position[i];
+    command.kp[i] = kp;
+    command.kd[i] = kd;
+  }
+  return command;
+}
+
+}  // namespace stance::sim::test
