@@ -3,13 +3,15 @@
 //   contact     = contact switch and planned stance
 //   trust alpha = min(1, time in contact / contact_ramp, load)
 //   1. predict  state and P; a foot in contact rolls: d += u dt
-//   2. gate     a foot in contact slips where its velocity's NIS > slip_gate, before any update: its velocity is
-//   skipped, its
-//               time in contact starts again. A foot refused for slip_timeout is believed, its variance times
-//               slip_inflation.
+//   2. gate     before any update: a foot in contact slips where its velocity's NIS > slip_gate (or is no number); its
+//   time in
+//               contact starts again
 //   3. feet     not in contact or slipping: d = R c anew, its error uncorrelated, of variance swing_foot_noise^2 dt;
 //               others: variance plus (stance_foot_noise + unloading_foot_noise (1 - alpha))^2 dt
-//   4. update   each foot in contact: velocity (unless it slips), position; variances times 1 + ramp_gain (1 - alpha)
+//   4. update   each foot in contact: velocity, position; variances times 1 + ramp_gain (1 - alpha). A slipping foot's
+//   velocity
+//               is skipped, but once refused for slip_timeout it is taken, its variance times slip_inflation: if it is
+//               the filter that is wrong, that brings it back.
 //
 // Gating the velocity alone would not do: a slipping foot's position drags velocity and tilt with it, hence step 3 for
 // it too.
@@ -136,7 +138,8 @@ void BaseEstimator::step(const RobotState& state, const ContactPlan& plan, BaseE
   nis_sum_ = 0.0;
   updates_ = 0;
   const double dt = state.sample_period;
-  const double gap = kMicrosecond * static_cast<double>(state.utime - utime_) - kStateSamples * dt;
+  const double since_last = static_cast<double>(state.utime) - static_cast<double>(utime_);  // us
+  const double gap = kMicrosecond * since_last - kStateSamples * dt;
   const ImuMean oldest = imu_mean(state.samples.front(), dt);
   for (int lost = 0; lost < kMaxBridgedSamples && (lost + 0.5) * dt < gap; ++lost) advance(oldest);
   for (const SensorSample& sample : state.samples) step_sample(sample, dt, plan);
@@ -206,10 +209,10 @@ void BaseEstimator::step_sample(const SensorSample& sample, double dt, const Con
 
   for (int i = 0; i < kFeet; ++i) {
     if (!in_contact_[i]) continue;
-    if (!slipping_[i]) {
-      const double late = rejected_time_[i] >= c.slip_timeout ? c.slip_inflation : 1.0;
+    const bool given_up = rejected_time_[i] >= c.slip_timeout;
+    if (!slipping_[i] || given_up) {
       update(velocity_measurement(state_, imu, feet[i], foot_radius_),
-             late * squared(c.foot_velocity_sigma) * variance_scale[i]);
+             squared(c.foot_velocity_sigma) * (slipping_[i] ? c.slip_inflation : variance_scale[i]));
     }
     update(position_measurement(state_, feet[i], i), squared(c.foot_position_sigma) * variance_scale[i]);
   }
@@ -221,21 +224,18 @@ void BaseEstimator::step_sample(const SensorSample& sample, double dt, const Con
 }
 
 void BaseEstimator::gate(const ImuMean& imu, const FootMeasurement& foot, int index) noexcept {
-  slipping_[index] = false;
+  bool& slipping = slipping_[index];
   double& rejected_time = rejected_time_[index];
+  slipping = false;
   if (!in_contact_[index]) {
     rejected_time = 0.0;
     return;
   }
   const ErrorMeasurement velocity = velocity_measurement(state_, imu, foot, foot_radius_);
   const Matrix3 R = squared(config_.foot_velocity_sigma) * Matrix3::Identity();
-  if (filter_.innovation(velocity.z, velocity.H, R).nis <= config_.slip_gate) {
-    rejected_time = std::max(0.0, rejected_time - imu.dt);
-  } else if (rejected_time < config_.slip_timeout) {
-    slipping_[index] = true;
-    rejected_time += imu.dt;
-    contact_time_[index] = 0.0;
-  }
+  slipping = !(filter_.innovation(velocity.z, velocity.H, R).nis <= config_.slip_gate);
+  if (slipping) contact_time_[index] = 0.0;
+  rejected_time = std::clamp(rejected_time + (slipping ? imu.dt : -imu.dt), 0.0, config_.slip_timeout);
 }
 
 void BaseEstimator::update(const ErrorMeasurement& measurement, double variance) noexcept {
