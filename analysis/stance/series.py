@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
@@ -39,6 +39,10 @@ class Messages(Protocol):
 
     def field(self, name: str) -> Array:
         """One field, native byte order, shape (n, *dimensions of the field)."""
+        ...
+
+    def take(self, rows: Array) -> Messages:
+        """The rows where the mask (n,) is true."""
         ...
 
     def frame(self) -> pd.DataFrame:
@@ -97,10 +101,26 @@ class Run:
         return pd.concat([pd.Series(self.time(channel), name="t"), self.channels[channel].frame()], axis=1)
 
     @property
+    def span(self) -> tuple[float, float]:
+        """s, times of the first and the last ROBOT_STATE; (0, duration) unless `between` cut the run"""
+        state = self.field("ROBOT_STATE", "utime")
+        return (float(state[0] - self.start) * 1e-6, float(state[-1] - self.start) * 1e-6) if len(state) else (0.0, 0.0)
+
+    @property
     def duration(self) -> float:
         """s, from the first to the last ROBOT_STATE"""
-        state = self.field("ROBOT_STATE", "utime")
-        return float(state[-1] - state[0]) * 1e-6 if len(state) else 0.0
+        first, last = self.span
+        return last - first
+
+    def between(self, first: float | None, last: float | None) -> Run:
+        """The part from `first` to `last` [s]; times still count from the whole run's start."""
+        low, high = -np.inf if first is None else first, np.inf if last is None else last
+        parts, times = {}, {}
+        for name, messages in self.channels.items():
+            rows = (self.time(name) >= low) & (self.time(name) <= high)
+            if rows.any() or name == "ROBOT_STATE":
+                parts[name], times[name] = messages.take(rows), self.time(name)[rows]
+        return replace(self, channels=parts, _time=times)
 
     def time(self, channel: str) -> Floats:
         """s since the run's start, shape (n,).
@@ -122,7 +142,7 @@ class Run:
             if known.any():
                 position = np.arange(len(own), dtype=float)
                 return np.asarray(np.interp(position, position[known], trace[rows[known]]))
-        elif channel in OPERATOR_CHANNELS or (len(own) and (own.min() < -1.0 or own.max() > self.duration + 1.0)):
+        elif channel in OPERATOR_CHANNELS or (len(own) and (own.min() < -1.0 or own.max() > self.span[1] + 1.0)):
             received, at = self.channels["ROBOT_STATE"].received, self.time("ROBOT_STATE")
             order = np.argsort(received, kind="stable")
             return np.asarray(np.interp(self.channels[channel].received, received[order], at[order]))

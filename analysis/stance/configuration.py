@@ -1,0 +1,80 @@
+"""What a run's log says of its robot: the URDF and the YAML that stand in it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import yaml
+
+from .series import Run
+from .urdf import Robot, parse_urdf
+
+
+def configuration(run: Run) -> dict[str, Any]:
+    """The robot's YAML as the controller read it, else as the simulator did; empty where the log has none."""
+    for info in (run.controller, run.simulator):
+        if info is not None and info.configuration:
+            try:
+                found = yaml.safe_load(info.configuration)
+            except yaml.YAMLError:
+                continue
+            if isinstance(found, dict):
+                return found
+    return {}
+
+
+def value(run: Run, path: str) -> Any:
+    """What stands at a dotted path of the configuration, as controller.force_qp.friction; None where nothing does."""
+    found: Any = configuration(run)
+    for key in path.split("."):
+        found = found.get(key) if isinstance(found, dict) else None
+    return found
+
+
+def friction(run: Run) -> float | None:
+    """mu that the controller plans with."""
+    found = value(run, "controller.force_qp.friction")
+    return float(found) if isinstance(found, int | float) else None
+
+
+def scenario(run: Run) -> dict[str, Any]:
+    """The simulator's scenario; empty where the log has none."""
+    try:
+        found = yaml.safe_load(run.simulator.scenario) if run.simulator is not None else None
+    except yaml.YAMLError:
+        found = None
+    return found if isinstance(found, dict) else {}
+
+
+def robot(run: Run) -> Robot | None:
+    """The robot's body, its joints in the order of every joint vector; None where the log has no URDF."""
+    for info in (run.controller, run.simulator):
+        if info is not None and info.urdf:
+            names = configuration(run).get("joints")
+            return parse_urdf(info.urdf, tuple(names) if names else None)
+    return None
+
+
+def foot_names(run: Run, count: int) -> list[str]:
+    """Names of the contacts for people: left and right where there are two, else those of the configuration."""
+    if count == 2:
+        return ["left", "right"]
+    names = configuration(run).get("feet") or []
+    return [str(names[i]) if i < len(names) else f"contact {i}" for i in range(count)]
+
+
+def option(run: Run, name: str) -> str | None:
+    """What followed an option such as --scenario on the simulator's (or the rollout's) command line."""
+    for info in (run.simulator, run.controller):
+        words = info.options.split() if info is not None else []
+        if name in words[:-1]:
+            return words[words.index(name) + 1]
+    return None
+
+
+def title(run: Run) -> str:
+    """Robot and scenario, for headings."""
+    info = run.controller or run.simulator
+    name = info.robot if info is not None else "robot"
+    chosen = option(run, "--scenario")
+    return f"{name}, {chosen}" if chosen else name

@@ -1,0 +1,685 @@
+"""What a run amounts to in figures. Pure functions of a `Run`: no files, no plots, no clock.
+
+Every figure has its unit in its name where it is not SI. A figure that the log cannot give is None.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import configuration
+from .messages import CHANNELS, OPERATOR_CHANNELS
+from .series import Array, Floats, Integers, Run, match
+
+if TYPE_CHECKING:
+    from .log import LogReport
+
+MIN_NORMAL_FORCE = 5.0  # N, below it a contact's friction ratio says nothing
+PUSH_THRESHOLD = 1e-9  # N, of a push that counts as one
+
+STAGES = ("decode", "validate", "estimate", "plan", "model", "force_qp", "torque", "safety", "encode")
+SAFETY_MODES = ("run", "hold", "damp", "stop")
+FAULTS = (
+    "state_stale",
+    "state_invalid",
+    "command_invalid",
+    "qp_failed",
+    "robot_fallen",
+    "operator_stop",
+    "torque_saturated",
+    "joint_limit",
+)
+QP_STATUS = ("not_run", "solved", "max_iterations", "infeasible", "invalid_problem", "inaccurate")
+QP_NOT_RUN, QP_SOLVED = 0, 1
+BEHAVIOURS = ("stand", "walk", "lie_down", "track", "catch")
+REFUSALS = ("refused_stale", "refused_not_finite", "refused_order", "refused_run")
+
+
+@dataclass(frozen=True)
+class Percentiles:
+    """Of one quantity over a run, in the unit that its name says: values that did occur, never between two."""
+
+    p50: float
+    p99: float
+    p99_9: float
+    max: float
+
+    @classmethod
+    def of(cls, values: Array) -> Percentiles | None:
+        """None where there are no finite values."""
+        finite = np.asarray(values, float)
+        finite = finite[np.isfinite(finite)]
+        if not len(finite):
+            return None
+        p50, p99, p99_9 = (float(value) for value in np.percentile(finite, [50.0, 99.0, 99.9], method="higher"))
+        return cls(p50, p99, p99_9, float(finite.max()))
+
+
+@dataclass(frozen=True)
+class Trunk:
+    tilt_max_deg: float
+    """of the trunk's z axis from W's"""
+    tilt_rms_deg: float
+    height_min: float
+    """m, of B over W's ground"""
+
+
+@dataclass(frozen=True)
+class CenterOfMass:
+    """Distance [m] of the centre of mass from its reference."""
+
+    error_max: float
+    error_rms: float
+    error_final: float
+
+
+@dataclass(frozen=True)
+class Miss:
+    """One or more ticks in a row that did not happen on time."""
+
+    at: float
+    """s"""
+    ticks: int
+    wake_latency_us: float
+    tick_us: float
+    cause: str
+
+
+@dataclass(frozen=True)
+class Ticks:
+    count: int
+    missed: int
+    missed_share: float
+    """missed of all that were due"""
+    without_new_state: int
+    dropped_states: int
+    lockstep: bool
+    misses: list[Miss]
+
+
+@dataclass(frozen=True)
+class Timing:
+    """Times [us] by the wall clock; what only real time has is None in lockstep."""
+
+    stage_us: dict[str, Percentiles | None]
+    tick_us: Percentiles | None
+    cpu_us: Percentiles | None
+    wake_latency_us: Percentiles | None
+    period_jitter_us: Percentiles | None
+    """|period - nominal|"""
+    state_to_command_us: Percentiles | None
+    """from the state's stamp to the published command"""
+    slack_min_us: float | None
+    period_us: float
+    """nominal"""
+
+
+@dataclass(frozen=True)
+class ForceQp:
+    status: dict[str, int]
+    failures: int
+    """ticks on which it ran and did not solve"""
+    iterations: Percentiles | None
+    primal_residual_max: float
+    """N"""
+    dual_residual_max: float
+    active_max: int
+    effort_mean: float
+    """||f||_R"""
+    effort_max: float
+
+
+@dataclass(frozen=True)
+class Friction:
+    mu: float | None
+    """of the controller's configuration"""
+    planned_share_max: float | None
+    """max(|fx|, |fy|) / (mu fz) of planned forces: 1 is the edge of the cone"""
+    measured_ratio_max: float | None
+    """tangential over normal of the contacts' true forces"""
+
+
+@dataclass(frozen=True)
+class ForceError:
+    """Norm [N] of a foot's true force less the planned one."""
+
+    rms: float
+    max: float
+
+
+@dataclass(frozen=True)
+class JointUse:
+    """Shares of a joint's limits: 1 is the limit. None where the URDF has none."""
+
+    name: str
+    torque_share_max: float | None
+    speed_share_max: float | None
+    position_share_max: float | None
+    """of half its range, from the range's middle"""
+
+
+@dataclass(frozen=True)
+class Joints:
+    torque_share_max: float | None
+    speed_share_max: float | None
+    position_share_max: float | None
+    each: list[JointUse]
+
+
+@dataclass(frozen=True)
+class EstimatorError:
+    """Of the controller's estimate of its base against the truth of the same instant."""
+
+    position_rms: float
+    """m"""
+    position_max: float
+    position_drift: float
+    """m, change of the error from the run's start to its end"""
+    velocity_rms: float
+    """m/s"""
+    tilt_max_deg: float
+    yaw_max_deg: float
+
+
+@dataclass(frozen=True)
+class Push:
+    start: float
+    """s"""
+    duration: float
+    """s"""
+    impulse_W: tuple[float, float, float]
+    """N s"""
+    force_max: float
+    """N"""
+
+    @property
+    def impulse(self) -> float:
+        """N s"""
+        return float(np.linalg.norm(self.impulse_W))
+
+
+@dataclass(frozen=True)
+class SafetyChange:
+    at: float
+    """s"""
+    mode: str
+
+
+@dataclass(frozen=True)
+class ChannelUse:
+    name: str
+    count: int
+    rate_hz: float
+    missing: int
+    """messages that seq says were sent and the log lacks"""
+    restarts: int
+
+
+@dataclass(frozen=True)
+class LogQuality:
+    complete: bool
+    """nothing skipped, nothing missing"""
+    missing: int
+    skipped_bytes: int
+    problems: list[str]
+
+
+@dataclass(frozen=True)
+class Metrics:
+    """The whole run. Sections are None where the log lacks their channel."""
+
+    run_id: int
+    duration: float
+    """s"""
+    fell: bool
+    fell_at: float | None
+    """s"""
+    trunk: Trunk | None
+    center_of_mass: CenterOfMass | None
+    ticks: Ticks | None
+    timing: Timing | None
+    qp: ForceQp | None
+    friction: Friction
+    force_error: ForceError | None
+    joints: Joints | None
+    estimator: EstimatorError | None
+    pushes: list[Push]
+    refused: dict[str, int]
+    refused_total: int
+    drives_damped: float | None
+    """s"""
+    faults: dict[str, int]
+    safety: list[SafetyChange]
+    channels: list[ChannelUse]
+    log: LogQuality | None = field(default=None)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain data, for JSON and for limits."""
+        return asdict(self)
+
+
+def measure(run: Run, report: LogReport | None = None) -> Metrics:
+    """All of it. `report` is the log's, for what could not be read."""
+    fell_at = fall(run)
+    refused = refusals(run)
+    damped = run.field("TRUTH", "drives_damped") if "TRUTH" in run else None
+    return Metrics(
+        run_id=run.run_id,
+        duration=run.duration,
+        fell=fell_at is not None,
+        fell_at=fell_at,
+        trunk=trunk(run),
+        center_of_mass=center_of_mass(run),
+        ticks=ticks(run),
+        timing=timing(run),
+        qp=force_qp(run),
+        friction=friction(run),
+        force_error=force_error(run),
+        joints=joints(run),
+        estimator=estimator_error(run),
+        pushes=pushes(run),
+        refused=refused,
+        refused_total=sum(refused.values()),
+        drives_damped=None if damped is None else float((damped != 0).sum() * period(run)),
+        faults=faults(run),
+        safety=safety(run),
+        channels=channels(run),
+        log=None if report is None else log_quality(report),
+    )
+
+
+def period(run: Run) -> float:
+    """s, the control period: the samples of one ROBOT_STATE together."""
+    samples = run.field("ROBOT_STATE", "sample_period")
+    count = run.field("ROBOT_STATE", "gyro").shape[1]
+    nominal = float(np.median(samples)) * count if len(samples) else 0.0
+    if nominal > 0.0:
+        return nominal
+    steps = np.diff(run.field("ROBOT_STATE", "utime"))
+    return float(np.median(steps)) * 1e-6 if len(steps) else 0.01
+
+
+def tilt(quat_WB: Array) -> Floats:
+    """rad, angle of B's z axis from W's: (..., 4) → (...)."""
+    w, x, y, z = np.moveaxis(np.asarray(quat_WB, float), -1, 0)
+    return np.asarray(np.arctan2(2 * np.hypot(x * z + w * y, y * z - w * x), 1 - 2 * (x * x + y * y)))
+
+
+def yaw(quat_WB: Array) -> Floats:
+    """rad, heading: (..., 4) → (...)."""
+    w, x, y, z = np.moveaxis(np.asarray(quat_WB, float), -1, 0)
+    return np.asarray(np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z)))
+
+
+def fall(run: Run) -> float | None:
+    """s, when it fell: by the truth where it is logged, else by the controller's fault; None where it did not."""
+    if "TRUTH" in run:
+        down = run.field("TRUTH", "fallen") != 0
+        time = run.time("TRUTH")
+    elif "CONTROLLER_TRACE" in run:
+        down = run.field("CONTROLLER_TRACE", "faults") & (1 << FAULTS.index("robot_fallen")) != 0
+        time = run.time("CONTROLLER_TRACE")
+    else:
+        return None
+    return float(time[np.argmax(down)]) if down.any() else None
+
+
+def trunk(run: Run) -> Trunk | None:
+    """By the truth where it is logged, else by the controller's estimate."""
+    channel = "TRUTH" if "TRUTH" in run else "CONTROLLER_TRACE"
+    if channel not in run:
+        return None
+    angle = np.degrees(tilt(run.field(channel, "quat_WB")))
+    height = run.field(channel, "p_WB")[:, 2]
+    return Trunk(float(angle.max()), _rms(angle), float(height.min()))
+
+
+def center_of_mass_error(run: Run) -> tuple[Floats, Floats] | None:
+    """(t [s], error [m] (n, 3)): the true centre of mass less its reference, else the estimated one less it."""
+    if "CONTROLLER_TRACE" not in run:
+        return None
+    reference = run.field("CONTROLLER_TRACE", "x_ref")[:, 3:6]
+    time = run.time("CONTROLLER_TRACE")
+    if "TRUTH" not in run:
+        return time, run.field("CONTROLLER_TRACE", "x")[:, 3:6] - reference
+    rows, truth_rows = truth_of_ticks(run)
+    return time[rows], run.field("TRUTH", "p_WC")[truth_rows] - reference[rows]
+
+
+def truth_of_ticks(run: Run) -> tuple[Integers, Integers]:
+    """Rows of CONTROLLER_TRACE that took a new state, and the rows of TRUTH of the same instants."""
+    found = match(run.field("CONTROLLER_TRACE", "state_seq"), run.field("TRUTH", "seq"))
+    rows = np.flatnonzero((found >= 0) & (run.field("CONTROLLER_TRACE", "state_is_new") != 0))
+    return rows, found[rows]
+
+
+def center_of_mass(run: Run) -> CenterOfMass | None:
+    found = center_of_mass_error(run)
+    if found is None or not len(found[1]):
+        return None
+    distance = np.linalg.norm(found[1], axis=1)
+    return CenterOfMass(float(distance.max()), _rms(distance), float(distance[-1]))
+
+
+def missed_by_tick(run: Run) -> Integers:
+    """How many deadlines were missed before each message of CONTROLLER_TIMING, (n,)."""
+    total = run.field("CONTROLLER_TIMING", "missed_ticks")
+    fresh = run.field("CONTROLLER_TIMING", "seq") == 1
+    before = np.concatenate([total[:1], total[:-1]])
+    return np.asarray(np.maximum(np.where(fresh, total, total - before), 0), np.int64)
+
+
+def is_lockstep(run: Run) -> bool:
+    """True where the simulator set the pace, so that no deadline is in the log."""
+    return not any(
+        run.field("CONTROLLER_TIMING", name).any() for name in ("wake_latency_us", "slack_us", "state_age_us")
+    )
+
+
+def ticks(run: Run) -> Ticks | None:
+    if "CONTROLLER_TIMING" not in run:
+        return None
+    missed = missed_by_tick(run)
+    time = run.time("CONTROLLER_TIMING")
+    late = run.field("CONTROLLER_TIMING", "wake_latency_us")
+    took = run.field("CONTROLLER_TIMING", "tick_us")
+    budget = 1e6 * period(run)
+    misses = []
+    for row in np.flatnonzero(missed).tolist():
+        before = float(took[row - 1]) if row else 0.0
+        if late[row] + took[row] >= budget and took[row] > late[row]:
+            cause = f"the tick took {took[row] / 1000:.1f} ms"
+        elif before >= budget - late[row] and before > late[row]:
+            cause = f"the tick before took {before / 1000:.1f} ms"
+        else:
+            cause = f"woke {late[row] / 1000:.1f} ms late: the machine ran something else"
+        misses.append(Miss(float(time[row]), int(missed[row]), float(late[row]), float(took[row]), cause))
+    dropped = run.field("CONTROLLER_TIMING", "dropped_states")
+    count = run.count("CONTROLLER_TIMING")
+    total = int(missed.sum())
+    is_new = run.field("CONTROLLER_TRACE", "state_is_new") if "CONTROLLER_TRACE" in run else np.ones(count)
+    return Ticks(
+        count=count,
+        missed=total,
+        missed_share=total / (count + total),
+        without_new_state=int((is_new == 0).sum()),
+        dropped_states=int(dropped.max(initial=0)),
+        lockstep=is_lockstep(run),
+        misses=misses,
+    )
+
+
+def timing(run: Run) -> Timing | None:
+    if "CONTROLLER_TIMING" not in run:
+        return None
+    nominal = 1e6 * period(run)
+    stages = run.field("CONTROLLER_TIMING", "stage_us")
+    tick = run.field("CONTROLLER_TIMING", "tick_us")
+    lockstep = is_lockstep(run)
+
+    def real_time(values: Array) -> Percentiles | None:
+        return None if lockstep else Percentiles.of(values)
+
+    return Timing(
+        stage_us={name: Percentiles.of(stages[:, i]) for i, name in enumerate(STAGES)},
+        tick_us=Percentiles.of(tick),
+        cpu_us=Percentiles.of(run.field("CONTROLLER_TIMING", "cpu_us")),
+        wake_latency_us=real_time(run.field("CONTROLLER_TIMING", "wake_latency_us")),
+        period_jitter_us=real_time(np.abs(run.field("CONTROLLER_TIMING", "period_us")[1:] - nominal)),
+        state_to_command_us=real_time(run.field("CONTROLLER_TIMING", "state_age_us") + tick),
+        slack_min_us=None if lockstep else float(run.field("CONTROLLER_TIMING", "slack_us").min()),
+        period_us=nominal,
+    )
+
+
+def force_qp(run: Run) -> ForceQp | None:
+    if "CONTROLLER_TRACE" not in run:
+        return None
+    status = run.field("CONTROLLER_TRACE", "qp_status")
+    ran = status != QP_NOT_RUN
+    effort = run.field("CONTROLLER_TRACE", "effort")[ran]
+
+    def largest(name: str) -> float:
+        values = run.field("CONTROLLER_TRACE", name)[ran]
+        return float(values.max(initial=0.0)) if np.isfinite(values).all() else float("inf")
+
+    return ForceQp(
+        status={_name(QP_STATUS, value): int((status == value).sum()) for value in np.unique(status).tolist()},
+        failures=int((ran & (status != QP_SOLVED)).sum()),
+        iterations=Percentiles.of(run.field("CONTROLLER_TRACE", "qp_iterations")[ran]),
+        primal_residual_max=largest("qp_primal_residual"),
+        dual_residual_max=largest("qp_dual_residual"),
+        active_max=int(run.field("CONTROLLER_TRACE", "qp_active").max(initial=0)),
+        effort_mean=float(effort.mean()) if len(effort) else 0.0,
+        effort_max=float(effort.max(initial=0.0)),
+    )
+
+
+def num_contacts(run: Run) -> int:
+    """Contacts in use: feet."""
+    for channel in ("ROBOT_STATE", "TRUTH", "FORCE_PLAN"):
+        if channel in run:
+            return int(run.field(channel, "num_contacts").max())
+    return 0
+
+
+def num_joints(run: Run) -> int:
+    """Joints in use."""
+    return int(run.field("ROBOT_STATE", "num_joints").max()) if "ROBOT_STATE" in run else 0
+
+
+def planned_forces(run: Run) -> tuple[Floats, Floats, Array]:
+    """Stage 0 of every plan: (t [s] (n,), force [N] (n, contacts, 3) in W, planned contact (n, contacts) bool)."""
+    used = num_contacts(run)
+    force = run.field("FORCE_PLAN", "force")[:, 0, :used]
+    return run.time("FORCE_PLAN"), force, run.field("FORCE_PLAN", "contact")[:, 0, :used] != 0
+
+
+def cone_share(force: Array, mu: float) -> Floats:
+    """max(|fx|, |fy|) / (mu fz) of forces [N] (..., 3) → (...): 1 is the cone's edge; nan where there is no load."""
+    normal = np.where(force[..., 2] > MIN_NORMAL_FORCE, force[..., 2], np.nan)
+    return np.asarray(np.abs(force[..., :2]).max(axis=-1) / (mu * normal))
+
+
+def friction_ratio(force: Array) -> Floats:
+    """Tangential over normal of forces [N] (..., 3) → (...); nan where there is no load."""
+    normal = np.where(force[..., 2] > MIN_NORMAL_FORCE, force[..., 2], np.nan)
+    return np.asarray(np.hypot(force[..., 0], force[..., 1]) / normal)
+
+
+def friction(run: Run) -> Friction:
+    mu = configuration.friction(run)
+    share = ratio = None
+    if "FORCE_PLAN" in run and mu:
+        _, force, contact = planned_forces(run)
+        share = _nanmax(np.where(contact, cone_share(force, mu), np.nan))
+    if "TRUTH" in run:
+        ratio = _nanmax(friction_ratio(run.field("TRUTH", "f_F_W")[:, : num_contacts(run)]))
+    return Friction(mu, share, ratio)
+
+
+def force_error(run: Run) -> ForceError | None:
+    if "TRUTH" not in run:
+        return None
+    compared = run.field("TRUTH", "plan_seq") > 0
+    error = np.linalg.norm(run.field("TRUTH", "force_error")[compared, : num_contacts(run)], axis=-1)
+    return ForceError(_rms(error), float(error.max())) if error.size else None
+
+
+def joint_shares(run: Run) -> tuple[Floats, dict[str, Floats], tuple[str, ...]] | None:
+    """(t [s], {torque, speed, position: share of the limit (n, joints), nan without one}, joint names).
+
+    By the truth where it is logged, else by the robot's own sensors. None where the log has no URDF.
+    """
+    body = configuration.robot(run)
+    used = num_joints(run)
+    if body is None or not used:
+        return None
+    limits = body.moving[:used]
+    if "TRUTH" in run:
+        channel = "TRUTH"
+        position, speed = run.field(channel, "joint_position"), run.field(channel, "joint_velocity")
+    else:
+        channel = "ROBOT_STATE"
+        position, speed = run.field(channel, "joint_position")[:, -1], run.field(channel, "joint_velocity")[:, -1]
+    torque = run.field(channel, "joint_torque")
+    lower, upper = (np.array([getattr(joint, name) for joint in limits]) for name in ("lower", "upper"))
+    bounded = np.isfinite(lower) & np.isfinite(upper) & (upper > lower)
+    middle = np.where(bounded, lower + upper, 0.0) / 2
+    half = np.where(bounded, upper - lower, np.nan) / 2
+
+    def share(values: Array, limit: Array) -> Floats:
+        return np.asarray(np.abs(values[:, :used]) / np.where(np.isfinite(limit) & (limit > 0.0), limit, np.nan))
+
+    shares = {
+        "torque": share(torque, np.array([joint.effort for joint in limits])),
+        "speed": share(speed, np.array([joint.velocity for joint in limits])),
+        "position": share(position[:, :used] - middle, half),
+    }
+    return run.time(channel), shares, tuple(joint.name for joint in limits)
+
+
+def joints(run: Run) -> Joints | None:
+    found = joint_shares(run)
+    if found is None:
+        return None
+    _, shares, names = found
+    each = [
+        JointUse(name, *(_nanmax(shares[quantity][:, i]) for quantity in ("torque", "speed", "position")))
+        for i, name in enumerate(names)
+    ]
+    worst = [_nanmax(shares[quantity]) for quantity in ("torque", "speed", "position")]
+    return Joints(worst[0], worst[1], worst[2], each)
+
+
+def estimator_error(run: Run) -> EstimatorError | None:
+    if "TRUTH" not in run or "CONTROLLER_TRACE" not in run:
+        return None
+    rows, truth_rows = truth_of_ticks(run)
+    if not len(rows):
+        return None
+
+    def both(name: str) -> tuple[Array, Array]:
+        return run.field("CONTROLLER_TRACE", name)[rows], run.field("TRUTH", name)[truth_rows]
+
+    estimate, truth = both("p_WB")
+    error = estimate - truth
+    distance = np.linalg.norm(error, axis=1)
+    v_estimate, v_truth = both("v_WB")
+    q_estimate, q_truth = both("quat_WB")
+    turned = np.degrees(np.angle(np.exp(1j * (yaw(q_estimate) - yaw(q_truth)))))
+    return EstimatorError(
+        position_rms=_rms(distance),
+        position_max=float(distance.max()),
+        position_drift=float(np.linalg.norm(error[-1] - error[0])),
+        velocity_rms=_rms(np.linalg.norm(v_estimate - v_truth, axis=1)),
+        tilt_max_deg=float(np.degrees(np.abs(_tilt_between(q_estimate, q_truth)).max())),
+        yaw_max_deg=float(np.abs(turned).max()),
+    )
+
+
+def pushes(run: Run) -> list[Push]:
+    """The external forces on the base that the truth shows, one after the other."""
+    if "TRUTH" not in run:
+        return []
+    force = run.field("TRUTH", "push_W")
+    time = run.time("TRUTH")
+    step = period(run)
+    found = []
+    for first, last in intervals(np.linalg.norm(force, axis=1) > PUSH_THRESHOLD):
+        part = force[first : last + 1]
+        impulse = part.sum(axis=0) * step
+        found.append(
+            Push(
+                start=float(time[first] - step),  # the mean of a row is over the period that ends at its time
+                duration=float((last + 1 - first) * step),
+                impulse_W=(float(impulse[0]), float(impulse[1]), float(impulse[2])),
+                force_max=float(np.linalg.norm(part, axis=1).max()),
+            )
+        )
+    return found
+
+
+def refusals(run: Run) -> dict[str, int]:
+    """How many joint commands the simulator refused in all, by reason."""
+    if "TRUTH" not in run:
+        return {}
+    return {name.removeprefix("refused_"): int(run.field("TRUTH", name)[-1]) for name in REFUSALS}
+
+
+def faults(run: Run) -> dict[str, int]:
+    """fault → ticks on which it stood, over the whole run, a controller that was started again included."""
+    if "CONTROLLER_TRACE" not in run:
+        return {}
+    count = run.field("CONTROLLER_TRACE", "fault_count")
+    session = run.session("CONTROLLER_TRACE")
+    last = np.append(np.flatnonzero(np.diff(session)), len(session) - 1)
+    total = count[last].sum(axis=0)
+    return {_name(FAULTS, i): int(value) for i, value in enumerate(total.tolist())}
+
+
+def safety(run: Run) -> list[SafetyChange]:
+    """The safety mode at the start and at each change."""
+    if "CONTROLLER_TRACE" not in run:
+        return []
+    mode = run.field("CONTROLLER_TRACE", "safety")
+    time = run.time("CONTROLLER_TRACE")
+    rows = np.append(0, np.flatnonzero(np.diff(mode)) + 1)
+    return [SafetyChange(float(time[row]), _name(SAFETY_MODES, int(mode[row]))) for row in rows]
+
+
+def channels(run: Run) -> list[ChannelUse]:
+    """Counts, rates and what is missing by seq, per channel of the run."""
+    found = []
+    for name in sorted(
+        run, key=lambda channel: list(CHANNELS).index(channel) if channel in CHANNELS else len(CHANNELS)
+    ):
+        seq = run.field(name, "seq")
+        utime = run.field(name, "utime")
+        step = np.diff(seq)
+        span = float(utime[-1] - utime[0]) * 1e-6
+        missing = 0 if name in OPERATOR_CHANNELS else int(np.maximum(step - 1, 0).sum())
+        rate = (len(seq) - 1) / span if span > 0.0 else 0.0
+        found.append(ChannelUse(name, len(seq), rate, missing, int((step < 0).sum())))
+    return found
+
+
+def log_quality(report: LogReport) -> LogQuality:
+    """What of the log file itself is amiss."""
+    problems = report.problems()
+    missing = sum(channel.missing for channel in report.channels)
+    return LogQuality(not problems, missing, report.skipped_bytes, problems)
+
+
+def intervals(active: Array) -> list[tuple[int, int]]:
+    """First and last row of each stretch of true values, (n,) bool."""
+    edges = np.diff(np.concatenate([[0], np.asarray(active, np.int8), [0]]))
+    firsts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
+    return [(int(first), int(end) - 1) for first, end in zip(firsts, ends, strict=True)]
+
+
+def _tilt_between(first: Array, second: Array) -> Floats:
+    """rad, between the z axes of two series of quaternions (n, 4)."""
+
+    def z_axis(q: Array) -> Array:
+        w, x, y, z = np.moveaxis(np.asarray(q, float), -1, 0)
+        return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
+
+    a, b = z_axis(first), z_axis(second)
+    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)))
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else 0.0
+
+
+def _nanmax(values: Array) -> float | None:
+    finite = values[~np.isnan(values)]
+    return float(finite.max()) if finite.size else None
+
+
+def _name(names: tuple[str, ...], value: int) -> str:
+    return names[value] if 0 <= value < len(names) else f"unknown_{value}"

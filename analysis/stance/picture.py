@@ -1,0 +1,330 @@
+"""A drawing of the robot at chosen instants: its links, the ground's forces on its feet, and the push it takes.
+
+By the truth where it is logged, else by the controller's estimate; the body is the URDF that stands in the log.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Circle, FancyArrowPatch, Polygon
+
+from . import configuration, metrics, style
+from .errors import UnreadableError
+from .metrics import Push
+from .series import Array, Floats, Run
+from .style import new_figure, styled
+from .urdf import Robot, Shape, rotation_from_quaternion, transform
+
+FORCE_SCALE = 0.004  # m of arrow per N
+PUSH_SCALE = 0.008  # m of arrow per N, of the push
+PUSH_LENGTH = 0.30  # m, the longest arrow of a push
+SIDE, FRONT = "side", "front"
+
+LINK_COLOUR = "#7d8b99"
+FAR_LINK_COLOUR = "#b4bec8"
+TRUNK_COLOUR = "#dfe6ec"
+CONE_HEIGHT = 0.22  # m, of the drawn friction cones
+KEY_FORCE = 50.0  # N, of the arrow that shows the scale
+
+
+@dataclass(frozen=True)
+class Pose:
+    """The robot at one instant. Frames as in the messages."""
+
+    time: float
+    """s"""
+    T_WB: Floats
+    """(4, 4)"""
+    q: Floats
+    """rad, (joints,)"""
+    p_WF: Floats
+    """m, (contacts, 3), foot tips"""
+    f_F_W: Floats
+    """N, (contacts, 3), of the ground on each foot"""
+    push_W: Floats
+    """N, (3,)"""
+    tilt: float
+    """rad"""
+
+
+def pose_at(run: Run, time: float) -> Pose:
+    """The logged instant nearest to `time` [s]. Raises UnreadableError where the log has no TRUTH."""
+    if "TRUTH" not in run:
+        raise UnreadableError("no TRUTH in the log: the robot cannot be drawn")
+    row = int(np.argmin(np.abs(run.time("TRUTH") - time)))
+    contacts, joints = metrics.num_contacts(run), metrics.num_joints(run)
+
+    def at(name: str) -> Array:
+        return np.asarray(run.field("TRUTH", name)[row])
+
+    quaternion = at("quat_WB")
+    return Pose(
+        time=float(run.time("TRUTH")[row]),
+        T_WB=transform(rotation_from_quaternion(quaternion), at("p_WB")),
+        q=at("joint_position")[:joints],
+        p_WF=at("p_WF")[:contacts],
+        f_F_W=at("f_F_W")[:contacts],
+        push_W=at("push_W"),
+        tilt=float(metrics.tilt(quaternion)),
+    )
+
+
+@styled
+def picture(run: Run, instants: Sequence[float] | None = None, view: str | None = None) -> Figure:
+    """The robot at `instants` [s], seen from the side or the front.
+
+    Without instants: a row for each of the two hardest pushes, from just before it until the robot stands again, each
+    seen from where the push is best seen. Raises UnreadableError where the log has no TRUTH or no URDF.
+    """
+    body = configuration.robot(run)
+    if body is None:
+        raise UnreadableError("no URDF in the log: the robot cannot be drawn")
+    rows: list[tuple[str, Sequence[float], str]] = []
+    if instants is not None:
+        rows.append((view or SIDE, list(instants), ""))
+    else:
+        hardest = sorted(metrics.pushes(run), key=lambda push: -push.impulse)[:2]
+        for push in sorted(hardest, key=lambda push: push.start):
+            seen = view or (FRONT if abs(push.impulse_W[1]) > abs(push.impulse_W[0]) else SIDE)
+            rows.append((seen, _instants_of(run, push), style.push_text(push)))
+        if not rows:
+            rows.append((view or SIDE, np.linspace(*run.span, 5)[1:-1].tolist(), ""))
+    columns = max(len(times) for _, times, _ in rows)
+    fig = new_figure(
+        0.35 + 2.7 * columns, 0.85 + 3.15 * len(rows), "The robot and the ground's forces", configuration.title(run)
+    )
+    axes = fig.subplots(len(rows), columns, squeeze=False)
+    mu = configuration.friction(run)
+    centre = np.mean([pose_at(run, times[0]).T_WB[:3, 3] for _, times, _ in rows], axis=0)
+    for row, (seen, times, label) in enumerate(rows):
+        first = pose_at(run, times[0])
+        for column in range(columns):
+            ax = axes[row, column]
+            if column >= len(times):
+                ax.set_axis_off()
+                continue
+            pose = pose_at(run, times[column])
+            draw(ax, body, pose, seen, ghost=first if column else None, centre=centre, mu=mu)
+            words = f"t = {pose.time:.2f} s   tilt {np.degrees(pose.tilt):.1f}°"
+            ax.set_title(words, fontsize=9, fontweight="normal", loc="center")
+        if label:
+            axes[row, 0].set_ylabel(f"{label}, seen from the {seen}", fontsize=9, color="#8a5a00", labelpad=6)
+    _key(axes[-1, 0], mu)
+    return fig
+
+
+def _key(ax: Axes, mu: float | None) -> None:
+    """What the marks mean, below the first drawing."""
+    left, y = ax.get_xlim()[0] + 0.02, -0.155
+    _arrow(ax, np.array([left, y]), np.array([left + KEY_FORCE * FORCE_SCALE, y]), style.MUTED, 2.0, 14)
+    cone = f"   shaded: friction cone, µ = {mu:g}" if mu else ""
+    words = ax.annotate(
+        f"{KEY_FORCE:.0f} N of the ground   ○ centre of mass{cone}   pale: before the push",
+        (left + KEY_FORCE * FORCE_SCALE + 0.03, y),
+        va="center",
+        fontsize=8,
+        color=style.MUTED,
+        annotation_clip=False,
+    )
+    words.set_in_layout(False)
+
+
+def _instants_of(run: Run, push: Push) -> list[float]:
+    """Before a push, within it, at its end, at the largest deflection after it, and back again [s]."""
+    time = run.time("TRUTH")
+    position = run.field("TRUTH", "p_WB")
+    end = push.start + push.duration
+    before = position[int(np.argmin(np.abs(time - (push.start - 0.02))))]
+    after = np.flatnonzero((time >= end) & (time <= end + 1.0))
+    peak = end
+    if len(after):
+        peak = float(time[after[np.argmax(np.linalg.norm(position[after] - before, axis=1))]])
+    peak = max(peak, end + 0.08)
+    return [push.start - 0.02, push.start + 0.5 * push.duration, end, peak, min(peak + 1.0, run.span[1])]
+
+
+def draw(
+    ax: Axes,
+    body: Robot,
+    pose: Pose,
+    view: str,
+    ghost: Pose | None = None,
+    centre: Array | None = None,
+    mu: float | None = None,
+) -> None:
+    """Draws one pose on an axis in metres of W; `ghost` is another pose, faint behind it; `mu` that of the cones."""
+    plane = _plane(view)
+    middle = (pose.T_WB[:3, 3] if centre is None else np.asarray(centre)) @ plane[0]
+    ax.axhspan(-0.08, 0.0, color="#eceff2", lw=0, zorder=0)
+    ax.axhline(0.0, color=style.MUTED, lw=0.9, zorder=1)
+    if ghost is not None:
+        _body(ax, body, ghost, view, alpha=0.16, order=2)
+    _body(ax, body, pose, view, alpha=1.0, order=4)
+    com = body.center_of_mass(pose.q, pose.T_WB) @ plane.T
+    ax.plot(*com, "o", ms=6.5, mfc="white", mec=style.INK, mew=1.4, zorder=12)
+    ax.plot([com[0], com[0]], [0.0, com[1]], color=style.INK, lw=0.7, ls=(0, (1, 2)), zorder=3)
+    for foot, (tip, force) in enumerate(zip(pose.p_WF, pose.f_F_W, strict=True)):
+        ground = np.array([tip @ plane[0], 0.0])
+        arrow = force @ plane.T * FORCE_SCALE
+        if mu and force[2] > metrics.MIN_NORMAL_FORCE:
+            edge = np.array([mu * CONE_HEIGHT, CONE_HEIGHT])
+            cone = [ground, ground + edge * [-1.0, 1.0], ground + edge]
+            ax.add_patch(Polygon(cone, closed=True, fc=style.FEET[foot % len(style.FEET)], alpha=0.10, lw=0, zorder=3))
+        if np.linalg.norm(arrow) > 0.01:
+            _arrow(ax, ground, ground + arrow, style.FEET[foot % len(style.FEET)], 2.4, 14)
+    _force_labels(ax, pose, plane)
+    push = pose.push_W @ plane.T
+    size = float(np.linalg.norm(push))
+    if size > 0.5:
+        tip = pose.T_WB[:3, 3] @ plane.T
+        length = min(max(PUSH_SCALE * size, 0.12), PUSH_LENGTH)
+        edge = tip - push / size * 0.5 * _trunk_extent(body, pose, view)
+        start = edge - push / size * length
+        _arrow(ax, start, edge, style.PUSH, 4.0, 20)
+        ax.text(
+            0.5 * (start[0] + edge[0]),
+            start[1] + 0.045,
+            f"{size:.0f} N",
+            color="#8a5a00",
+            fontsize=8.5,
+            ha="center",
+            zorder=20,
+        )
+    ax.set_xlim(middle - 0.50, middle + 0.50)
+    ax.set_ylim(-0.20, 1.05)
+    ax.set_aspect("equal")
+    ax.set_xticks([])
+    ax.set_yticks([])
+    ax.grid(False)
+    for spine in ax.spines.values():
+        spine.set_visible(False)
+
+
+def _plane(view: str) -> Floats:
+    """Rows: W's directions that are right and up in the drawing. From the front, the robot's left is at our right."""
+    return np.array([[1.0, 0.0, 0.0] if view == SIDE else [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+
+
+def _depth(view: str) -> int:
+    """The axis of W that points at us, with y towards the left leg behind, or x towards us."""
+    return 1 if view == SIDE else 0
+
+
+def _body(ax: Axes, body: Robot, pose: Pose, view: str, alpha: float, order: int) -> None:
+    plane = _plane(view)
+    frames = body.forward(pose.q, pose.T_WB)
+    far = {name: frame[_depth(view), 3] for name, frame in frames.items()}
+    # From the side we stand at the robot's right: what has more y is further away.
+    away = 1.0 if view == SIDE else -1.0
+    for name in sorted(frames, key=lambda link: -away * far[link]):
+        link = body.links[name]
+        side = 0 if name.endswith("_l") else 1 if name.endswith("_r") else None
+        behind = view == SIDE and side == 0
+        for shape in link.visual:
+            _shape(ax, frames[name] @ shape.T_link, shape, plane, _link_colour(side, behind), alpha, order)
+        for shape in link.collision:
+            if shape.kind == "sphere":
+                centre = (frames[name] @ shape.T_link)[:3, 3] @ plane.T
+                colour = style.FEET[side or 0]
+                ax.add_patch(
+                    Circle((centre[0], centre[1]), shape.size[0], fc=colour, ec="none", alpha=alpha, zorder=order + 2)
+                )
+
+
+def _link_colour(side: int | None, behind: bool) -> str:
+    if side is None:
+        return TRUNK_COLOUR
+    return FAR_LINK_COLOUR if behind else LINK_COLOUR
+
+
+def _shape(ax: Axes, T: Array, shape: Shape, plane: Array, colour: str, alpha: float, order: int) -> None:
+    if shape.kind == "box":
+        corners = np.array(np.meshgrid(*[[-0.5 * size, 0.5 * size] for size in shape.size])).reshape(3, -1)
+        points = (T[:3, :3] @ corners + T[:3, 3:]).T @ plane.T
+        ax.add_patch(
+            Polygon(_hull(points), closed=True, fc=colour, ec=LINK_COLOUR, lw=1.2, alpha=alpha, zorder=order + 1)
+        )
+    elif shape.kind == "cylinder":
+        radius, length = shape.size
+        ends = np.array([T[:3, 3] - 0.5 * length * T[:3, 2], T[:3, 3] + 0.5 * length * T[:3, 2]]) @ plane.T
+        _capsule(ax, ends, radius, colour, alpha, order)
+    elif shape.kind == "sphere":
+        centre = T[:3, 3] @ plane.T
+        ax.add_patch(Circle((centre[0], centre[1]), shape.size[0], fc=colour, ec="none", alpha=alpha, zorder=order))
+
+
+def _capsule(ax: Axes, ends: Array, radius: float, colour: str, alpha: float, order: int) -> None:
+    """A link with round ends, (2, 2) m."""
+    along = ends[1] - ends[0]
+    turn = np.arctan2(along[1], along[0])
+    half = np.linspace(-np.pi / 2, np.pi / 2, 14)
+    outline = [ends[1] + radius * np.array([np.cos(turn + a), np.sin(turn + a)]) for a in half]
+    outline += [ends[0] + radius * np.array([np.cos(turn + np.pi + a), np.sin(turn + np.pi + a)]) for a in half]
+    ax.add_patch(Polygon(outline, closed=True, fc=colour, ec="white", lw=0.6, alpha=alpha, zorder=order))
+
+
+def _trunk_extent(body: Robot, pose: Pose, view: str) -> float:
+    """m, how wide the trunk's box is in the drawing's horizontal direction."""
+    boxes = [shape for shape in body.links[body.root].visual if shape.kind == "box"]
+    if not boxes:
+        return 0.0
+    size = np.array(boxes[0].size)
+    return float(np.abs(pose.T_WB[:3, :3].T @ _plane(view)[0]) @ size)
+
+
+def _arrow(ax: Axes, start: Array, end: Array, colour: str, width: float, order: int) -> None:
+    ax.add_patch(
+        FancyArrowPatch(
+            (float(start[0]), float(start[1])),
+            (float(end[0]), float(end[1])),
+            arrowstyle="-|>",
+            mutation_scale=6.0 * width,
+            lw=width,
+            color=colour,
+            shrinkA=0,
+            shrinkB=0,
+            zorder=order,
+        )
+    )
+
+
+def _force_labels(ax: Axes, pose: Pose, plane: Array) -> None:
+    """How large each foot's force is, under the ground."""
+    places = pose.p_WF @ plane[0]
+    together = len(places) == 2 and abs(places[0] - places[1]) < 0.12
+    for foot, (place, force) in enumerate(zip(places, pose.f_F_W, strict=True)):
+        side = 0.0 if not together else (0.09 if foot == 0 else -0.09)
+        ax.text(
+            float(place) + side,
+            -0.022,
+            f"{np.linalg.norm(force):.0f} N",
+            color=style.FEET[foot % len(style.FEET)],
+            fontsize=8,
+            ha="center",
+            va="top",
+            zorder=20,
+        )
+
+
+def _hull(points: Array) -> Array:
+    """Convex hull of points (n, 2), counter-clockwise."""
+    ordered = sorted(map(tuple, points.tolist()))
+
+    def half(sequence: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
+        kept: list[tuple[float, ...]] = []
+        for point in sequence:
+            while len(kept) > 1 and _turns_right(kept[-2], kept[-1], point):
+                kept.pop()
+            kept.append(point)
+        return kept[:-1]
+
+    return np.array(half(ordered) + half(ordered[::-1]))
+
+
+def _turns_right(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> bool:
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) <= 0.0

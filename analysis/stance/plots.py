@@ -1,0 +1,567 @@
+"""The plots of a run: each function takes a `Run` and returns a matplotlib Figure; nothing is shown or saved here."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import MaxNLocator
+
+from . import configuration, metrics, style
+from .check import Verdict
+from .metrics import Metrics, Percentiles
+from .series import Array, Floats, Run
+from .style import new_figure, shade, styled, time_axis
+
+WIDTH = 11.0  # inch
+CONTACT_FORCE = 5.0  # N, normal force above which the truth counts as a contact
+TAIL = ((0.5, "p50"), (0.01, "p99"), (0.001, "p99.9"))  # share of ticks above → name
+
+
+@styled
+def summary_card(run: Run, measured: Metrics, verdict: Verdict | None = None) -> Figure:
+    """1: what came out, at a glance: the verdict, what ran, and how much of each limit was used."""
+    findings = verdict.findings if verdict is not None else []
+    rows = max(len(findings), 9)
+    height = 1.9 + 0.26 * rows
+    fig = Figure(figsize=(WIDTH, height))
+    ax = fig.add_axes((0.0, 0.0, 1.0, 1.0))
+    ax.set_axis_off()
+    ax.set_xlim(0.0, WIDTH)
+    ax.set_ylim(height, 0.0)
+
+    passed = verdict.passed if verdict is not None else not measured.fell
+    colour = style.GOOD if passed else style.BAD
+    ax.add_patch(Rectangle((0.0, 0.0), WIDTH, 1.15, color=colour, lw=0))
+    word = "PASS" if passed else "FAIL"
+    ax.text(0.35, 0.58, word, fontsize=30, fontweight="bold", color="white", va="center")
+    outcome = f"fell after {measured.fell_at:.2f} s" if measured.fell_at is not None else f"stood {run.duration:.1f} s"
+    ax.text(2.25, 0.40, f"{configuration.title(run)}: {outcome}", fontsize=15, color="white", va="center")
+    kept = f"{len(findings) - len(verdict.violated)} of {len(findings)} limits kept" if verdict is not None else ""
+    pushes = ", ".join(style.push_text(push) for push in measured.pushes[:4]) or "no push"
+    ax.text(2.25, 0.80, f"{pushes}   {kept}", fontsize=9.5, color="white", va="center", alpha=0.95)
+
+    y = 1.5
+    for name, text in _run_facts(run, measured):
+        ax.text(0.35, y, name, fontsize=8.5, color=style.MUTED, va="center")
+        ax.text(1.55, y, text, fontsize=8.5, va="center", family="DejaVu Sans")
+        y += 0.26
+    left, bar, right = 5.1, 8.15, 10.65
+    ax.text(left, 1.36, "limit", fontsize=8, color=style.MUTED, va="bottom")
+    ax.text(bar - 0.15, 1.36, "measured", fontsize=8, color=style.MUTED, va="bottom", ha="right")
+    ax.text(bar, 1.36, "share of the limit used", fontsize=8, color=style.MUTED, va="bottom")
+    for place, finding in enumerate(findings):
+        y = 1.5 + 0.26 * place
+        ink = style.INK if finding.passed else style.BAD
+        mark = "·" if finding.value is None else "✓" if finding.passed else "✗"
+        ax.text(left - 0.22, y, mark, fontsize=10, color=style.GOOD if finding.passed else style.BAD, va="center")
+        ax.text(left, y, finding.limit.name, fontsize=8.5, va="center", color=ink)
+        ax.text(bar - 0.15, y, finding.measured, fontsize=8.5, va="center", ha="right", color=ink)
+        _limit_bar(ax, finding.limit.bound, finding.limit.value, finding.value, (bar, right - 1.05), y, finding.passed)
+        ax.text(right, y, finding.rule, fontsize=8, va="center", ha="right", color=style.MUTED)
+    return fig
+
+
+def _limit_bar(
+    ax: Axes, bound: str, limit: float | bool | str, value: object, span: tuple[float, float], y: float, passed: bool
+) -> None:
+    """A bar for how much of a limit was used; none where the limit is 0 or no number."""
+    numbers = [part for part in (limit, value) if isinstance(part, int | float) and not isinstance(part, bool)]
+    if len(numbers) < 2 or not limit:
+        return
+    used = numbers[1] / numbers[0] if bound == "max" else numbers[0] / numbers[1] if numbers[1] else 1.0
+    width = span[1] - span[0]
+    ax.add_patch(Rectangle((span[0], y - 0.055), width, 0.11, color=style.GRID, lw=0))
+    colour = style.BAD if not passed else style.PUSH if used > 0.8 else style.GOOD
+    ax.add_patch(Rectangle((span[0], y - 0.055), width * float(np.clip(used, 0.0, 1.0)), 0.11, color=colour, lw=0))
+
+
+def _run_facts(run: Run, measured: Metrics) -> list[tuple[str, str]]:
+    facts = [("run", f"{measured.run_id}")]
+    for name, info in (("simulator", run.simulator), ("controller", run.controller)):
+        if info is not None:
+            facts.append((name, f"{info.program} {info.version}"))
+            facts.append(("", f"{info.source}, {info.build}"))
+    seed = run.simulator.seed if run.simulator is not None else configuration.option(run, "--seed")
+    if seed is not None:
+        facts.append(("seed", str(seed)))
+    info = run.controller or run.simulator
+    if info is not None:
+        facts.append(("input hash", info.input_hash))
+    found = measured.ticks
+    if found is not None:
+        facts.append(("clock", "lockstep" if found.lockstep else "real time"))
+        facts.append(("ticks", f"{found.count}, missed {found.missed}"))
+        for miss in found.misses[:4]:
+            facts.append(("", f"{miss.ticks} at {miss.at:.2f} s: {miss.cause}"))
+        if len(found.misses) > 4:
+            facts.append(("", f"and {len(found.misses) - 4} more times"))
+    if measured.timing is not None and measured.timing.tick_us is not None:
+        tick = measured.timing.tick_us
+        facts.append(("tick time", f"p50 {tick.p50:.0f}, p99 {tick.p99:.0f}, max {tick.max:.0f} µs"))
+    if measured.log is not None:
+        whole = "complete" if measured.log.complete else f"{len(measured.log.problems)} remarks"
+        facts.append(("log", whole))
+    return facts
+
+
+@styled
+def timing(run: Run) -> Figure:
+    """2: the tick's period and the time of each stage: series, histogram, and tail against the deadline."""
+    fig = new_figure(WIDTH, 8.2, "Tick period and time per stage", configuration.title(run))
+    if "CONTROLLER_TIMING" not in run:
+        style.no_data(fig.add_subplot(), "no CONTROLLER_TIMING in the log")
+        return fig
+    lockstep = metrics.is_lockstep(run)
+    time = run.time("CONTROLLER_TIMING")
+    stage = run.field("CONTROLLER_TIMING", "stage_us")
+    tick = run.field("CONTROLLER_TIMING", "tick_us")
+    deadline = 1e6 * metrics.period(run)
+    axes = fig.subplot_mosaic(
+        [["period", "period"], ["stages", "stages"], ["histogram", "tail"], ["bars", "tail"]],
+        height_ratios=[1.0, 1.25, 1.1, 1.5],
+        width_ratios=[1.0, 1.1],
+    )
+
+    ax = axes["period"]
+    period = run.field("CONTROLLER_TIMING", "period_us")
+    if lockstep:
+        ax.plot(time, period / 1000, color=style.TRUTH, lw=0.6)
+        ax.set_title("Wall time between ticks (lockstep: the simulator sets the pace)")
+        ax.set_ylabel("period [ms]")
+    else:
+        ax.plot(time[1:], (period[1:] - deadline) / 1000, color=style.TRUTH, lw=0.6)
+        ax.set_title(f"Tick period less its nominal {deadline / 1000:g} ms")
+        ax.set_ylabel("deviation [ms]")
+        missed = metrics.missed_by_tick(run)
+        rows = np.flatnonzero(missed)
+        if len(rows):
+            ax.plot(
+                time[rows], (period[rows] - deadline) / 1000, "v", color=style.BAD, ms=5, label=f"{missed.sum()} missed"
+            )
+            ax.legend(loc="upper right")
+    shade(ax, run, label=True)
+
+    ax = axes["stages"]
+    ax.stackplot(time, stage.T, colors=style.STAGES, labels=metrics.STAGES, lw=0)
+    ax.set_title("Where each tick's time goes")
+    ax.set_ylabel("wall time [µs]")
+    top = float(np.percentile(tick, 99.5)) * 1.35
+    ax.set_ylim(0.0, max(top, 1.0))
+    above = int((tick > top).sum())
+    note = f"deadline at {deadline:,.0f} µs" + (f"; {above} ticks reach beyond this axis" if above else "")
+    ax.text(0.995, 0.97, note, transform=ax.transAxes, ha="right", va="top", fontsize=7.5, color=style.MUTED)
+    handles, labels = ax.get_legend_handles_labels()
+    ax.legend(handles[::-1], labels[::-1], loc="center left", bbox_to_anchor=(1.0, 0.5), labelspacing=0.25)
+    shade(ax, run)
+    time_axis([axes["period"], ax], run)
+
+    quantities: list[tuple[str, Array, str]] = [("tick, wake-up to published", tick, style.TRUTH)]
+    if not lockstep:
+        late = run.field("CONTROLLER_TIMING", "wake_latency_us")
+        quantities.append(("wake-up after the deadline", late, style.ESTIMATE))
+        jitter = np.abs(period[1:] - deadline)
+        quantities.append(("|period less nominal|", jitter, style.SERIES[2]))
+        age = run.field("CONTROLLER_TIMING", "state_age_us") + tick
+        quantities.append(("state's stamp to command", age, style.SERIES[3]))
+
+    ax = axes["histogram"]
+    positive = np.concatenate([values[values > 0] for _, values, _ in quantities])
+    edges = np.geomspace(max(positive.min(), 1.0), positive.max() * 1.1, 70) if len(positive) else np.ones(2)
+    bins = edges.tolist()
+    for _, values, colour in quantities:
+        ax.hist(values, bins, histtype="stepfilled", color=colour, alpha=0.25)
+        ax.hist(values, bins, histtype="step", color=colour, lw=1.0)
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_ylim(0.7, None)
+    ax.axvline(deadline, color=style.BAD, lw=1.0, ls=(0, (4, 2)))
+    ax.set_title("Histogram")
+    ax.set_xlabel("time [µs]")
+    ax.set_ylabel("ticks")
+
+    _tail(axes["tail"], quantities, deadline)
+    _stage_bars(axes["bars"], stage)
+    return fig
+
+
+def _tail(ax: Axes, quantities: list[tuple[str, Array, str]], deadline: float) -> None:
+    """Complementary CDF: what share of ticks took longer, with p50, p99, p99.9 and max marked."""
+    lowest = 1.0
+    for name, values, colour in quantities:
+        ordered = np.sort(values)
+        count = len(ordered)
+        above = 1.0 - np.arange(count) / count
+        lowest = min(lowest, above[-1])
+        found = Percentiles.of(values)
+        assert found is not None
+        ax.step(ordered, above, where="post", color=colour, lw=1.3)
+        marks = [(found.p50, 0.5), (found.p99, 0.01), (found.p99_9, 0.001), (found.max, above[-1])]
+        shown = [(x, y) for x, y in marks if y >= above[-1]]
+        ax.plot(*zip(*shown, strict=True), "o", color=colour, ms=4.5, mec="white", mew=0.7)
+        numbers = " / ".join(f"{value:,.0f}" for value in (found.p50, found.p99, found.p99_9, found.max))
+        ax.plot([], [], "o-", color=colour, ms=4.5, mec="white", mew=0.7, label=f"{name}\n{numbers}")
+    ax.axvline(deadline, color=style.BAD, lw=1.0, ls=(0, (4, 2)))
+    ax.annotate(
+        "deadline",
+        (deadline, 0.0),
+        xycoords=("data", "axes fraction"),
+        xytext=(-3, 4),
+        textcoords="offset points",
+        ha="right",
+        fontsize=7.5,
+        color=style.BAD,
+    )
+    for share, name in TAIL:
+        if share >= lowest:
+            ax.axhline(share, color=style.FAINT, lw=0.7, zorder=0)
+            ax.annotate(
+                name,
+                (0.0, share),
+                xycoords=("axes fraction", "data"),
+                xytext=(3, 2),
+                textcoords="offset points",
+                fontsize=7.5,
+                color=style.MUTED,
+            )
+    ax.set_xscale("log")
+    ax.set_yscale("log")
+    ax.set_ylim(lowest * 0.6, 1.3)
+    ax.set_xlim(max(1.0, ax.get_xlim()[0]), None)
+    ax.set_xlabel("time [µs]")
+    ax.set_ylabel("share of ticks that took longer")
+    ax.set_title("Tail: p50 / p99 / p99.9 / max [µs]")
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2, labelspacing=0.6)
+
+
+def _stage_bars(ax: Axes, stage: Array) -> None:
+    for place in range(len(metrics.STAGES)):
+        found = Percentiles.of(stage[:, place])
+        if found is None or found.max <= 0.0:
+            continue
+        y = len(metrics.STAGES) - 1 - place
+        colour = style.STAGES[place]
+        low = max(found.p50, 0.1)
+        ax.plot([low, max(found.max, low)], [y, y], color=colour, lw=5, alpha=0.35, solid_capstyle="butt")
+        ax.plot(low, y, "o", color=colour, ms=6, mec=style.INK, mew=0.6)
+        ax.plot([max(found.p99, 0.1)], [y], "|", color=style.INK, ms=9, mew=1.2)
+        ax.plot([max(found.p99_9, 0.1)], [y], "|", color=style.MUTED, ms=9, mew=1.2)
+        ax.annotate(
+            f"{found.p50:,.1f} / {found.p99:,.1f} / {found.max:,.0f}",
+            (max(found.max, 0.1), y),
+            xytext=(5, 0),
+            textcoords="offset points",
+            va="center",
+            fontsize=7.5,
+            color=style.MUTED,
+        )
+    ax.set_yticks(range(len(metrics.STAGES)), metrics.STAGES[::-1])
+    ax.set_xscale("log")
+    low, high = ax.get_xlim()
+    ax.set_xlim(max(low, 0.05), high * 12)
+    ax.set_ylim(-0.7, len(metrics.STAGES) - 0.3)
+    ax.set_xlabel("time [µs]")
+    ax.set_title("Each stage: p50 / p99 / max [µs]")
+    ax.grid(axis="y", visible=False)
+
+
+@styled
+def center_of_mass(run: Run) -> Figure:
+    """3: centre of mass and trunk against their reference: planned, estimated and true."""
+    fig = new_figure(WIDTH, 6.6, "Centre of mass and base against reference", configuration.title(run))
+    if "CONTROLLER_TRACE" not in run:
+        style.no_data(fig.add_subplot(), "no CONTROLLER_TRACE in the log")
+        return fig
+    axes = fig.subplots(3, 2, sharex=True)
+    time = run.time("CONTROLLER_TRACE")
+    x, reference = run.field("CONTROLLER_TRACE", "x"), run.field("CONTROLLER_TRACE", "x_ref")
+    truth_time = run.time("TRUTH") if "TRUTH" in run else None
+    for row, name in enumerate("xyz"):
+        ax = axes[row, 0]
+        if truth_time is not None:
+            ax.plot(truth_time, 1000 * run.field("TRUTH", "p_WC")[:, row], color=style.TRUTH, lw=1.8, label="true")
+        ax.plot(time, 1000 * x[:, 3 + row], color=style.ESTIMATE, lw=0.9, label="estimated")
+        ax.plot(time, 1000 * reference[:, 3 + row], color=style.REFERENCE, lw=1.0, ls=(0, (5, 2)), label="reference")
+        ax.set_ylabel(f"{name} [mm]")
+        _at_least(ax, 4.0)
+    axes[0, 0].set_title("Centre of mass $p_{WC}$")
+    for row, angle in enumerate(("roll", "pitch", "yaw")):
+        ax = axes[row, 1]
+        if truth_time is not None:
+            ax.plot(truth_time, np.degrees(_rpy(run.field("TRUTH", "quat_WB"))[:, row]), color=style.TRUTH, lw=1.8)
+        ax.plot(time, np.degrees(x[:, row]), color=style.ESTIMATE, lw=0.9)
+        ax.plot(time, np.degrees(reference[:, row]), color=style.REFERENCE, lw=1.0, ls=(0, (5, 2)))
+        ax.set_ylabel(f"{angle} [°]")
+        _at_least(ax, 0.5)
+    axes[0, 1].set_title("Trunk's orientation")
+    for column in range(2):
+        shade(list(axes[:, column]), run, label=column == 0)
+        time_axis(list(axes[:, column]), run)
+    axes[0, 1].legend(*axes[0, 0].get_legend_handles_labels(), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
+    return fig
+
+
+def _rpy(quaternion: Array) -> Floats:
+    """rad, roll, pitch, yaw of R = Rz Ry Rx: (n, 4) → (n, 3)."""
+    w, x, y, z = np.moveaxis(np.asarray(quaternion, float), -1, 0)
+    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
+    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
+    return np.stack([roll, pitch, metrics.yaw(quaternion)], axis=-1)
+
+
+def _at_least(ax: Axes, span: float) -> None:
+    """Keeps an axis from magnifying what is smaller than `span`."""
+    low, high = ax.get_ylim()
+    if high - low < span:
+        middle = (low + high) / 2
+        ax.set_ylim(middle - span / 2, middle + span / 2)
+
+
+@styled
+def forces(run: Run) -> Figure:
+    """4: forces of the ground on each foot, planned and true, their share of the friction cone, and the effort."""
+    fig = new_figure(WIDTH, 8.6, "Ground reaction forces", configuration.title(run))
+    used = metrics.num_contacts(run)
+    if not used or ("FORCE_PLAN" not in run and "TRUTH" not in run):
+        style.no_data(fig.add_subplot(), "no FORCE_PLAN and no TRUTH in the log")
+        return fig
+    halves = [slice(0, (used + 1) // 2), slice((used + 1) // 2, used)] if used > 1 else [slice(0, 1)] * 2
+    rows = 5 if used > 1 else 6
+    grid = fig.add_gridspec(rows, used)
+    axes = np.array([[fig.add_subplot(grid[row, foot]) for foot in range(used)] for row in range(4)])
+    for row in range(4):
+        for foot in range(1, used):
+            axes[row, foot].sharey(axes[row, 0])
+            axes[row, foot].tick_params(labelleft=False)
+    below = [fig.add_subplot(grid[4, halves[0]]), fig.add_subplot(grid[rows - 1, halves[1]])]
+    mu = configuration.friction(run)
+    names = configuration.foot_names(run, used)
+    for foot in range(used):
+        colour = style.FEET[foot]
+        column = axes[:, foot]
+        if "TRUTH" in run:
+            time, true = run.time("TRUTH"), run.field("TRUTH", "f_F_W")[:, foot]
+            for row in range(3):
+                column[row].plot(time, true[:, row], color=colour, lw=1.4, label="simulated")
+            if mu:
+                column[3].plot(time, metrics.friction_ratio(true) / mu, color=colour, lw=1.2, label="simulated")
+        if "FORCE_PLAN" in run:
+            time, planned, contact = metrics.planned_forces(run)
+            for row in range(3):
+                column[row].plot(
+                    time, planned[:, foot, row], color=style.PLANNED, lw=0.9, ls=(0, (4, 1.5)), label="commanded"
+                )
+            if mu:
+                share = np.where(contact[:, foot], metrics.cone_share(planned[:, foot], mu), np.nan)
+                column[3].plot(time, share, color=style.PLANNED, lw=0.9, ls=(0, (4, 1.5)), label="commanded")
+        column[3].axhline(1.0, color=style.BAD, lw=0.9)
+        column[3].set_ylim(0.0, 1.12)
+        column[0].set_title(f"{names[foot].capitalize()} foot")
+        shade(list(column), run, label=foot == 0)
+        time_axis(list(column), run)
+        column[3].set_xlabel("")
+        column[3].tick_params(labelbottom=False)
+    for row, label in enumerate(("$f_x$ [N]", "$f_y$ [N]", "$f_z$ [N]", f"share of the\ncone, µ = {mu or 0:g}")):
+        axes[row, 0].set_ylabel(label)
+    handles, labels = axes[0, -1].get_legend_handles_labels()
+    axes[0, -1].legend(handles, labels, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+    _effort_and_error(below, run, used, names)
+    return fig
+
+
+def _effort_and_error(axes: list[Axes], run: Run, used: int, names: list[str]) -> None:
+    if "FORCE_PLAN" in run:
+        axes[0].plot(run.time("FORCE_PLAN"), run.field("FORCE_PLAN", "effort"), color=style.SERIES[3])
+        axes[0].set_ylim(0.0, None)
+    axes[0].set_title(r"Effort $\|f\|_R$")
+    axes[0].set_ylabel(r"[N $\sqrt{R}$]")
+    if "TRUTH" in run:
+        error = np.linalg.norm(run.field("TRUTH", "force_error")[:, :used], axis=-1)
+        error[run.field("TRUTH", "plan_seq") <= 0] = np.nan
+        for foot in range(used):
+            axes[1].plot(run.time("TRUTH"), error[:, foot], color=style.FEET[foot], lw=0.9, label=names[foot])
+        axes[1].legend(loc="upper right", ncols=used)
+        axes[1].set_ylim(0.0, None)
+    axes[1].set_title("Simulated less commanded force, norm")
+    axes[1].set_ylabel("[N]")
+    for ax in axes:
+        shade(ax, run)
+        time_axis([ax], run)
+
+
+@styled
+def gait(run: Run) -> Figure:
+    """5: which foot stands when: planned, believed, felt by the switch, and true; and how the load is shared."""
+    used = metrics.num_contacts(run)
+    names = configuration.foot_names(run, used)
+    kinds = [kind for kind in _contact_kinds(run, used) if kind is not None]
+    fig = new_figure(
+        WIDTH,
+        2.6 + 0.30 * max(used, 1) * max(len(kinds), 1),
+        "Gait: planned and measured contacts",
+        configuration.title(run),
+    )
+    if not used or not kinds:
+        style.no_data(fig.add_subplot(), "no contacts in the log")
+        return fig
+    top, bottom = fig.subplots(2, 1, sharex=True, height_ratios=[0.30 * used * len(kinds), 1.1])
+    ticks, labels = [], []
+    y = 0.0
+    for foot in range(used):
+        for name, time, contact, alpha in kinds:
+            spans = [
+                (float(time[first]), float(time[min(last + 1, len(time) - 1)] - time[first]))
+                for first, last in metrics.intervals(contact[:, foot])
+            ]
+            top.broken_barh(spans, (y - 0.38, 0.76), facecolor=style.FEET[foot], alpha=alpha, lw=0)
+            ticks.append(y)
+            labels.append(f"{names[foot]}: {name}")
+            y += 1.0
+        y += 0.4
+    top.set_yticks(ticks, labels)
+    top.set_ylim(y - 0.6, -0.8)
+    top.grid(axis="y", visible=False)
+    top.set_title("Contact")
+    if "TRUTH" in run:
+        normal = np.maximum(run.field("TRUTH", "f_F_W")[:, :used, 2], 0.0)
+        total = np.maximum(normal.sum(axis=1), 1e-9)
+        for foot in range(used):
+            bottom.plot(run.time("TRUTH"), normal[:, foot] / total, color=style.FEET[foot], label=names[foot])
+        bottom.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=used)
+    bottom.set_ylim(-0.02, 1.02)
+    bottom.set_title("Share of the load, true")
+    bottom.set_ylabel("share")
+    shade([top, bottom], run, label=True)
+    time_axis([top, bottom], run)
+    return fig
+
+
+def _contact_kinds(run: Run, used: int) -> list[tuple[str, Floats, Array, float] | None]:
+    """(name, t, (n, contacts) bool, opacity) of every way in which the log knows contacts."""
+
+    def of(channel: str, name: str, find: Callable[[], Array], alpha: float) -> tuple[str, Floats, Array, float] | None:
+        return (name, run.time(channel), find(), alpha) if channel in run else None
+
+    return [
+        of("FORCE_PLAN", "planned", lambda: run.field("FORCE_PLAN", "contact")[:, 0, :used] != 0, 0.35),
+        of("CONTROLLER_TRACE", "believed", lambda: run.field("CONTROLLER_TRACE", "contact")[:, :used] != 0, 0.55),
+        of("ROBOT_STATE", "switch", lambda: run.field("ROBOT_STATE", "contact_switch")[:, -1, :used] != 0, 0.75),
+        of("TRUTH", "true", lambda: run.field("TRUTH", "f_F_W")[:, :used, 2] > CONTACT_FORCE, 1.0),
+    ]
+
+
+@styled
+def joints(run: Run) -> Figure:
+    """6: torque, speed and position of each joint as a share of its limit."""
+    fig = new_figure(WIDTH, 7.0, "Joints: share of their limits", configuration.title(run))
+    found = metrics.joint_shares(run)
+    if found is None:
+        style.no_data(fig.add_subplot(), "no URDF in the log")
+        return fig
+    time, shares, names = found
+    groups = _joint_groups(names)
+    axes = fig.subplots(3, len(groups), sharex=True, sharey="row", squeeze=False)
+    for column, (title, members) in enumerate(groups):
+        for row, quantity in enumerate(("torque", "speed", "position")):
+            ax = axes[row, column]
+            for place, joint in enumerate(members):
+                values = shares[quantity][:, joint]
+                ax.plot(time, values, color=style.JOINTS[place % 8], lw=1.0, label=names[joint])
+            ax.axhline(1.0, color=style.BAD, lw=0.9)
+            largest = metrics._nanmax(shares[quantity])
+            ax.set_ylim(0.0, max(1.08, 1.05 * min(largest or 0.0, 3.0)))
+            if largest is not None and largest < 0.3:
+                ax.set_ylim(0.0, max(1.25 * largest, 0.02))
+        axes[0, column].set_title(title)
+        axes[0, column].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=4)
+        shade(list(axes[:, column]), run, label=column == 0)
+        time_axis(list(axes[:, column]), run)
+    axes[0, 0].set_ylabel(r"|torque| / limit")
+    axes[1, 0].set_ylabel("|speed| / limit")
+    axes[2, 0].set_ylabel("|position less middle| /\nhalf the range")
+    return fig
+
+
+def _joint_groups(names: tuple[str, ...]) -> list[tuple[str, list[int]]]:
+    """Joints by leg where their names end in _l and _r, else all together."""
+    sides = [("Left leg", "_l"), ("Right leg", "_r")]
+    groups = [(title, [i for i, name in enumerate(names) if name.endswith(end)]) for title, end in sides]
+    if sum(len(members) for _, members in groups) == len(names):
+        return groups
+    return [("All joints", list(range(len(names))))]
+
+
+@styled
+def force_qp(run: Run) -> Figure:
+    """7: the force QP: status, iterations, residuals and active constraints of every tick."""
+    fig = new_figure(WIDTH, 6.4, "Force QP", configuration.title(run))
+    if "CONTROLLER_TRACE" not in run:
+        style.no_data(fig.add_subplot(), "no CONTROLLER_TRACE in the log")
+        return fig
+    time = run.time("CONTROLLER_TRACE")
+    status = run.field("CONTROLLER_TRACE", "qp_status")
+    ran = status != metrics.QP_NOT_RUN
+    axes = list(fig.subplots(4, 1, sharex=True, height_ratios=[0.75, 1.0, 1.3, 0.8]))
+    ax = axes[0]
+    seen = np.unique(status).tolist()
+    for place, value in enumerate(seen):
+        rows = status == value
+        name = metrics.QP_STATUS[value] if 0 <= value < len(metrics.QP_STATUS) else f"unknown {value}"
+        colour = style.GOOD if value == metrics.QP_SOLVED else style.MUTED if value == 0 else style.BAD
+        ax.plot(time[rows], np.full(rows.sum(), place), "|", color=colour, ms=11, mew=0.8)
+        ax.annotate(
+            f"{name.replace('_', ' ')}: {rows.sum()}",
+            (1.0, place),
+            xycoords=("axes fraction", "data"),
+            xytext=(6, 0),
+            textcoords="offset points",
+            va="center",
+            color=colour,
+            fontsize=8.5,
+            annotation_clip=False,
+        )
+    ax.set_yticks([])
+    ax.set_ylim(-0.7, len(seen) - 0.3)
+    ax.grid(axis="y", visible=False)
+    ax.set_title("Status")
+
+    def where_ran(name: str) -> Floats:
+        return np.where(ran, run.field("CONTROLLER_TRACE", name).astype(float), np.nan)
+
+    axes[1].plot(time, where_ran("qp_iterations"), ".", color=style.TRUTH, ms=2.5)
+    axes[1].set_title("Iterations")
+    axes[1].set_ylabel("iterations")
+    axes[1].set_ylim(0.0, None)
+    axes[1].yaxis.set_major_locator(MaxNLocator(integer=True, nbins=5))
+    floor = 1e-16
+    for name, label, colour in (
+        ("qp_primal_residual", "primal [N]", style.TRUTH),
+        ("qp_dual_residual", "dual, scaled", style.ESTIMATE),
+    ):
+        axes[2].plot(time, np.maximum(where_ran(name), floor), ".", color=colour, ms=2.5, label=label)
+    axes[2].set_yscale("log")
+    axes[2].set_title(f"Residuals (0 is drawn at {floor:g})")
+    axes[2].set_ylabel("residual")
+    axes[2].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2, markerscale=3.0)
+    axes[3].step(time, where_ran("qp_active"), where="post", color=style.SERIES[2], lw=1.0)
+    axes[3].set_title("Active constraints of stage 0")
+    axes[3].set_ylabel("count")
+    axes[3].set_ylim(0.0, max(4.0, axes[3].get_ylim()[1]))
+    axes[3].yaxis.set_major_locator(MaxNLocator(integer=True, nbins=4))
+    shade(axes, run, label=True)
+    time_axis(axes, run)
+    return fig
+
+
+PLOTS: dict[str, Callable[[Run], Figure]] = {
+    "timing": timing,
+    "center_of_mass": center_of_mass,
+    "forces": forces,
+    "gait": gait,
+    "joints": joints,
+    "force_qp": force_qp,
+}
+"""name → plot of a run; the summary card also takes the metrics and the verdict"""

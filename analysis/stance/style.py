@@ -1,0 +1,191 @@
+"""How every plot of this package looks: colours that mean the same everywhere, fonts, and what is shaded behind."""
+
+from __future__ import annotations
+
+import functools
+import io
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import Any, ParamSpec
+
+import matplotlib
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from . import metrics
+from .series import Run
+
+P = ParamSpec("P")
+
+INK = "#1d2733"
+MUTED = "#6b7785"
+FAINT = "#c9d1d9"
+GRID = "#e6eaee"
+PAPER = "#ffffff"
+PANEL = "#f5f7f9"
+
+GOOD = "#23804a"
+BAD = "#c02f2a"
+MINUS = "\N{MINUS SIGN}"
+
+PUSH = "#f2b134"
+SAFETY = "#c02f2a"
+
+REFERENCE = "#1d2733"
+TRUTH = "#1769aa"
+ESTIMATE = "#e07b1a"
+PLANNED = "#1d2733"
+FEET = ("#1769aa", "#c2185b", "#2e8b57", "#8e5bb5")
+JOINTS = ("#1769aa", "#e07b1a", "#2e8b57", "#8e5bb5", "#c2185b", "#6d4c41", "#00897b", "#7a8793")
+STAGES = ("#b8c4d0", "#8fa3b5", "#7fb4d9", "#4f94c4", "#2e8b57", "#1769aa", "#e07b1a", "#d9a441", "#8e5bb5")
+SERIES = ("#1769aa", "#e07b1a", "#2e8b57", "#8e5bb5")
+
+RC: dict[str, Any] = {
+    "font.family": "DejaVu Sans",
+    "font.size": 9.0,
+    "text.color": INK,
+    "axes.titlesize": 10.0,
+    "axes.titleweight": "bold",
+    "axes.titlelocation": "left",
+    "axes.labelsize": 9.0,
+    "axes.labelcolor": INK,
+    "axes.edgecolor": MUTED,
+    "axes.linewidth": 0.7,
+    "axes.spines.top": False,
+    "axes.spines.right": False,
+    "axes.grid": True,
+    "axes.axisbelow": True,
+    "axes.formatter.useoffset": False,
+    "grid.color": GRID,
+    "grid.linewidth": 0.7,
+    "xtick.color": MUTED,
+    "ytick.color": MUTED,
+    "xtick.labelcolor": INK,
+    "ytick.labelcolor": INK,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "legend.fontsize": 8.0,
+    "legend.frameon": False,
+    "legend.handlelength": 1.8,
+    "legend.borderaxespad": 0.2,
+    "lines.linewidth": 1.2,
+    "lines.solid_capstyle": "round",
+    "figure.facecolor": PAPER,
+    "savefig.facecolor": PAPER,
+    "svg.fonttype": "path",
+    "svg.hashsalt": "stance",
+}
+
+
+def styled(draw: Callable[P, Figure]) -> Callable[P, Figure]:
+    """Gives a plot function this package's look, and its figure a canvas that needs no screen."""
+
+    @functools.wraps(draw)
+    def with_style(*args: P.args, **kwargs: P.kwargs) -> Figure:
+        with look():
+            figure = draw(*args, **kwargs)
+            FigureCanvasAgg(figure)
+            return figure
+
+    return with_style
+
+
+def render(figure: Figure, kind: str = "png", dpi: int = 120) -> bytes:
+    """The figure as a file's bytes: png, svg or pdf. The same figure gives the same bytes."""
+    dateless: dict[str, Any] = {"svg": {"Date": None}, "pdf": {"CreationDate": None}}
+    written = io.BytesIO()
+    with look():
+        figure.savefig(written, format=kind, dpi=dpi, metadata=dateless.get(kind))
+    return written.getvalue()
+
+
+@contextmanager
+def look() -> Iterator[None]:
+    """matplotlib's settings for as long as it lasts."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        matplotlib.rcParams.update(RC)  # type: ignore[arg-type]  # its stubs list every key as a literal
+        yield
+
+
+def new_figure(width: float, height: float, title: str, subtitle: str = "") -> Figure:
+    """A figure [inch] with a title and, smaller beside it, what it shows."""
+    figure = Figure(figsize=(width, height), layout="constrained")
+    engine = figure.get_layout_engine()
+    assert engine is not None
+    engine.set(rect=(0.005, 0.005, 0.99, 0.99 - 0.42 / height))  # type: ignore[call-arg]
+    top = 1.0 - 0.12 / height
+    figure.text(0.011, top, title, fontsize=13.0, fontweight="bold", va="top")
+    if subtitle:
+        figure.text(0.989, top, subtitle, fontsize=8.5, color=MUTED, va="top", ha="right")
+    return figure
+
+
+def shade(axes: Axes | Sequence[Axes], run: Run, label: bool = False) -> None:
+    """Behind a time axis: pushes, the time in which safety did not let the robot run, and the fall."""
+    found = metrics.pushes(run)
+    stops = _unsafe(run)
+    fell = metrics.fall(run)
+    for place, ax in enumerate([axes] if isinstance(axes, Axes) else axes):
+        for push in found:
+            ax.axvspan(push.start, push.start + push.duration, color=PUSH, alpha=0.45, lw=0, zorder=0)
+            if label and place == 0:
+                ax.annotate(
+                    push_text(push),
+                    (push.start + push.duration, 1.0),
+                    xycoords=("data", "axes fraction"),
+                    xytext=(3, -2),
+                    textcoords="offset points",
+                    va="top",
+                    fontsize=7.5,
+                    color="#8a5a00",
+                )
+        for first, last in stops:
+            ax.axvspan(first, last, facecolor=SAFETY, alpha=0.10, lw=0, zorder=0)
+        if fell is not None:
+            ax.axvline(fell, color=BAD, lw=1.2, ls=(0, (4, 2)), zorder=1)
+            if label and place == 0:
+                ax.annotate(
+                    "fell",
+                    (fell, 0.0),
+                    xycoords=("data", "axes fraction"),
+                    xytext=(-3, 3),
+                    textcoords="offset points",
+                    ha="right",
+                    fontsize=7.5,
+                    color=BAD,
+                )
+
+
+def push_text(push: metrics.Push) -> str:
+    """A push for people: its impulse and where it goes."""
+    parts = [
+        f"{'+' if value > 0 else MINUS}{axis}"
+        for axis, value in zip("xyz", push.impulse_W, strict=True)
+        if abs(value) > 0.1 * push.impulse
+    ]
+    return f"push {push.impulse:.2g} N s {' '.join(parts)}"
+
+
+def _unsafe(run: Run) -> list[tuple[float, float]]:
+    changes = metrics.safety(run)
+    ends = [change.at for change in changes[1:]] + [run.span[1]]
+    return [(change.at, end) for change, end in zip(changes, ends, strict=True) if change.mode != "run"]
+
+
+def time_axis(axes: Sequence[Axes], run: Run) -> None:
+    """Shares the run's time over a column of axes; only the lowest is labelled."""
+    for ax in axes[:-1]:
+        ax.tick_params(labelbottom=False)
+    for ax in axes:
+        ax.set_xlim(run.span[0], max(run.span[1], run.span[0] + 1e-3))
+    axes[-1].set_xlabel("time [s]")
+
+
+def no_data(ax: Axes, text: str) -> None:
+    """Says in an empty place what the log lacks."""
+    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=MUTED)
+    ax.set_xticks([])
+    ax.set_yticks([])
+    ax.grid(False)
