@@ -46,6 +46,8 @@ void Settings::validate() const {
   require(rho >= 1e-6 && rho <= 1e6, "rho", rho, "[1e-6, 1e6]");
   require(max_primal_residual > 0.0 && std::isfinite(max_primal_residual), "max_primal_residual", max_primal_residual,
           "(0, inf)");
+  require(max_dual_residual > 0.0 && std::isfinite(max_dual_residual), "max_dual_residual", max_dual_residual,
+          "(0, inf)");
 }
 
 std::unique_ptr<ForceQp> make_force_qp(const Settings& settings, Sizes sizes, double typical_force) {

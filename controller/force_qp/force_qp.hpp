@@ -49,7 +49,7 @@ struct Solution {
   explicit Solution(Sizes sizes);
   QpStatus status = QpStatus::kNotRun;
   QpEngine engine = QpEngine::kOsqpCondensed;
-  int iterations = 0;
+  int iterations = 0;               ///< of OSQP; 0 where the free minimiser is the solution
   double primal_residual = 0.0;     ///< N, largest violation of a force constraint
   double dual_residual = 0.0;       ///< N, largest step of a projected gradient (see kkt.hpp)
   int active = 0;                   ///< constraints active in stage 0
@@ -59,11 +59,12 @@ struct Solution {
 
 struct Settings {
   QpEngine engine = QpEngine::kOsqpCondensed;
-  double tolerance = 1e-6;    ///< OSQP's eps_abs and eps_rel, on the scaled problem
-  int max_iterations = 4000;  ///< a deterministic bound on a solve
-  int check_interval = 25;    ///< iterations between termination checks
-  double rho = 0.1;
+  double tolerance = 1e-6;           ///< OSQP's eps_abs and eps_rel, on the scaled problem
+  int max_iterations = 1000;         ///< of OSQP in one solve: a deterministic bound
+  int check_interval = 10;           ///< iterations between OSQP's termination checks
+  double rho = 1.0;                  ///< OSQP's, to start with
   double max_primal_residual = 0.5;  ///< N, above it a solution is kInaccurate
+  double max_dual_residual = 2.0;    ///< N, above it a solution is kInaccurate
   bool try_free_minimiser = true;    ///< step 1 of osqp_engine.hpp
   bool correct_active_set = true;    ///< step 3 of osqp_engine.hpp
   void validate() const;             ///< throws std::invalid_argument naming the field, its value and the range

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace stance::force_qp {
 namespace {
@@ -55,6 +56,7 @@ KktCheck::KktCheck(Sizes sizes)
 
 Residuals KktCheck::evaluate(const Problem& problem, const std::vector<ForceVector>& forces,
                              std::vector<StateVector>& states) noexcept {
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   const std::size_t N = problem.stages.size();
   const StateVector* x = &problem.x0;
   for (std::size_t k = 0; k < N; ++k) {
@@ -79,6 +81,7 @@ Residuals KktCheck::evaluate(const Problem& problem, const std::vector<ForceVect
     }
     gradient_[k] = stage.R.cwiseProduct(forces[k] - stage.f_ref);
     gradient_[k].noalias() += stage.dynamics.B.transpose().lazyProduct(costates_[k]);
+    if (!forces[k].allFinite() || !gradient_[k].allFinite()) return {kInfinity, kInfinity};
     for (int c = 0; c < problem.sizes.num_contacts; ++c) {
       const auto contact = static_cast<std::size_t>(c);
       const Residuals here = contact_residuals(forces[k].segment<3>(3 * c), gradient_[k].segment<3>(3 * c),

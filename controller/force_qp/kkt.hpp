@@ -27,7 +27,7 @@ int count_active(const Problem& problem, int stage, const ForceVector& f, double
 class KktCheck {
  public:
   explicit KktCheck(Sizes sizes);  ///< takes all memory
-  /// Rolls `forces` out into `states` and checks them.
+  /// Rolls `forces` out into `states` and checks them. Both residuals are infinite where a number is not finite.
   Residuals evaluate(const Problem& problem, const std::vector<ForceVector>& forces,
                      std::vector<StateVector>& states) noexcept;
   /// lambda_(k+1), k = 0..N-1, of the last evaluation.

@@ -1,6 +1,7 @@
 #include "controller/force_qp/osqp_engine.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "controller/force_qp/active_set.hpp"
 #include "controller/force_qp/inspect.hpp"
@@ -10,7 +11,7 @@
 namespace stance::force_qp {
 namespace {
 
-constexpr double kCoarseTolerance = 1e-3;  // good enough to guess the active set from
+constexpr double kCoarseTolerance = 1e-2;  // good enough to guess the active set from
 constexpr int kMaxCorrections = 12;        // of the active set, after each of OSQP's tolerances
 constexpr double kExact = 1e-6;            // N, residuals of a solution that is exact but for rounding
 constexpr double kZero = 1e-9;             // of a force or a multiplier, relative to the typical one
@@ -31,10 +32,7 @@ class OsqpEngine final : public ForceQp {
         constrained_(sizes),
         kkt_(sizes),
         taken_over_(sizes),
-        free_activity_(static_cast<std::size_t>(sizes.num_stages)),
         activity_(static_cast<std::size_t>(sizes.num_stages)),
-        last_(sizes),
-        last_costates_(static_cast<std::size_t>(sizes.num_stages), StateVector::Zero()),
         candidate_(sizes) {}
 
   QpStatus solve(const Problem& problem, Solution& solution) noexcept override {
@@ -45,14 +43,10 @@ class OsqpEngine final : public ForceQp {
     solution.active = 0;
     solution.status = inspect(problem, sizes_);
     if (solution.status == QpStatus::kSolved) {
-      take_over(problem);
-      if (!solve_free(problem, solution)) solution.status = solve_constrained(problem, solution);
+      solution.status = take_over(problem) ? solve_inspected(problem, solution) : QpStatus::kInvalidProblem;
     }
     if (solution.status == QpStatus::kSolved) {
       solution.active = count_active(problem, 0, solution.forces.front(), kActive * typical_force_);
-      last_ = solution;
-      last_costates_ = kkt_.costates();
-      has_last_ = true;
     } else {
       reset();
     }
@@ -63,17 +57,19 @@ class OsqpEngine final : public ForceQp {
     form_->reset();
     form_is_current_ = false;
     free_is_factored_ = false;
-    has_last_ = false;
+    has_multipliers_ = false;
   }
 
  private:
-  void take_over(const Problem& problem) noexcept {
+  /// Factors the free problem where it is another than the last. False where the cost is not convex.
+  bool take_over(const Problem& problem) noexcept {
     if (!free_is_factored_ || matrices_differ(problem, taken_over_)) {
       taken_over_ = problem;
       form_is_current_ = false;
-      activity_of_bounds(problem, free_activity_);
-      free_is_factored_ = free_.factor(problem, free_activity_, sizes_.num_stages - 1);
+      activity_of_bounds(problem, activity_);
+      free_is_factored_ = free_.factor(problem, activity_, sizes_.num_stages - 1);
     }
+    return free_is_factored_;
   }
 
   /// Checks solution.forces and writes the residuals down; the states follow the forces.
@@ -84,26 +80,21 @@ class OsqpEngine final : public ForceQp {
     return residuals;
   }
 
-  /// Step 1: whether the free minimiser is the solution.
-  bool solve_free(const Problem& problem, Solution& solution) noexcept {
-    if (!free_is_factored_ || !settings_.try_free_minimiser) return false;
+  QpStatus solve_inspected(const Problem& problem, Solution& solution) noexcept {
+    // Step 1
     free_.solve(problem, solution.forces);
-    if (!is_exact(check(problem, solution))) return false;
-    last_has_multipliers_ = false;
-    return true;
-  }
+    const Residuals residuals = check(problem, solution);
+    if (!std::isfinite(residuals.dual)) return QpStatus::kInvalidProblem;  // numbers too large to compute with
+    if (settings_.try_free_minimiser && is_exact(residuals)) {
+      has_multipliers_ = false;
+      return QpStatus::kSolved;
+    }
 
-  /// Steps 2 and 3.
-  QpStatus solve_constrained(const Problem& problem, Solution& solution) noexcept {
-    if (!free_is_factored_) return QpStatus::kInvalidProblem;  // the cost is not convex
+    // Steps 2 and 3
     if (!form_is_current_ && !form_->update_matrices(problem)) return QpStatus::kInvalidProblem;
     form_is_current_ = true;
     if (!form_->update_vectors(problem)) return QpStatus::kInvalidProblem;
-    if (has_last_) {
-      form_->warm_start(problem, last_.forces, last_.states, last_costates_, last_has_multipliers_);
-    }
-    last_has_multipliers_ = true;
-
+    warm_start(problem, solution.forces);
     const double coarse = std::max(kCoarseTolerance, settings_.tolerance);
     for (const double tolerance : {settings_.correct_active_set ? coarse : settings_.tolerance, settings_.tolerance}) {
       const OsqpSolver::Outcome outcome = form_->solve(tolerance, settings_.max_iterations - solution.iterations);
@@ -114,7 +105,24 @@ class OsqpEngine final : public ForceQp {
       if (settings_.correct_active_set && correct_active_set(problem, solution)) return QpStatus::kSolved;
       if (tolerance <= settings_.tolerance || solution.iterations >= settings_.max_iterations) break;
     }
-    return solution.primal_residual <= settings_.max_primal_residual ? QpStatus::kSolved : QpStatus::kInaccurate;
+    const bool accurate = solution.primal_residual <= settings_.max_primal_residual &&
+                          solution.dual_residual <= settings_.max_dual_residual;
+    return accurate ? QpStatus::kSolved : QpStatus::kInaccurate;
+  }
+
+  /// From the free minimiser, moved into the constraints, and the multipliers of the last solve.
+  void warm_start(const Problem& problem, const std::vector<ForceVector>& free) noexcept {
+    candidate_.forces = free;
+    for (std::size_t k = 0; k < problem.stages.size(); ++k) {
+      const StageData& stage = problem.stages[k];
+      for (std::size_t c = 0; c < static_cast<std::size_t>(NU / 3); ++c) {
+        auto force = candidate_.forces[k].template segment<3>(static_cast<Eigen::Index>(3 * c));
+        force = project_on_pyramid(force, problem.friction, stage.fz_min[c], stage.fz_max[c]);
+      }
+    }
+    kkt_.evaluate(problem, candidate_.forces, candidate_.states);
+    form_->warm_start(problem, candidate_.forces, candidate_.states, kkt_.costates(), has_multipliers_);
+    has_multipliers_ = true;
   }
 
   /// Step 3: whether the exact solution was found from the set that OSQP ended with.
@@ -134,7 +142,6 @@ class OsqpEngine final : public ForceQp {
       }
       last_changed = correct(problem);
     }
-    kkt_.evaluate(problem, solution.forces, solution.states);  // its costates are the solution's again
     return false;
   }
 
@@ -167,12 +174,8 @@ class OsqpEngine final : public ForceQp {
   ActiveSetProblem<NU> constrained_;
   KktCheck kkt_;
   Problem taken_over_;
-  Activity free_activity_;
   Activity activity_;
-  Solution last_;
-  std::vector<StateVector> last_costates_;
-  bool has_last_ = false;
-  bool last_has_multipliers_ = false;  ///< OSQP's are those of the last solution
+  bool has_multipliers_ = false;  ///< OSQP's are those of the last solution
   Solution candidate_;
 };
 

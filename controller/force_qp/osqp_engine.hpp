@@ -3,7 +3,8 @@
 //
 //   1. the free minimiser, by one backward recursion: where it satisfies every constraint it is the solution, 0
 //   iterations;
-//   2. OSQP, warm-started from the last solution, to a coarse and then to the full tolerance;
+//   2. OSQP, to a coarse and then to the full tolerance, from the free minimiser moved into the constraints and the
+//      multipliers that the last solve ended with (fewer iterations than from the last forces, shifted or not);
 //   3. after each of the two the minimiser under the constraints that OSQP finds active, its set corrected a bounded
 //   number
 //      of times by the signs of the multipliers: where the check finds it exact it is the solution.
