@@ -28,7 +28,8 @@
 namespace stance::estimation {
 namespace {
 
-constexpr double kMicrosecond = 1e-6;  ///< s
+constexpr double kMicrosecond = 1e-6;       ///< s
+constexpr double kForgottenVelocity = 3.0;  ///< m/s, sigma of a velocity of which nothing is known
 
 double squared(double x) { return x * x; }
 
@@ -189,7 +190,15 @@ void BaseEstimator::step_sample(const SensorSample& sample, double dt, const Con
   }
 
   // Both gates before any update: each foot is judged by the prediction alone.
-  for (int i = 0; i < kFeet; ++i) gate(imu, feet[i], i);
+  std::array<Vector3, kFeet> velocity_residual;
+  for (int i = 0; i < kFeet; ++i) velocity_residual[i] = gate(imu, feet[i], i);
+  if (given_up(0) && given_up(1) &&
+      (velocity_residual[0] - velocity_residual[1]).squaredNorm() <=
+          c.slip_gate * 2.0 * squared(c.foot_velocity_sigma)) {
+    forget(kVelocity, squared(kForgottenVelocity));
+    slipping_.fill(false);
+    rejected_time_.fill(0.0);
+  }
 
   std::array<double, kFeet> variance_scale;
   for (int i = 0; i < kFeet; ++i) {
@@ -201,16 +210,13 @@ void BaseEstimator::step_sample(const SensorSample& sample, double dt, const Con
       filter_.P.diagonal().segment<3>(foot_index(i)).array() += squared(noise) * dt;
     } else {
       state_.p_BF_W[i] = state_.R_WB * feet[i].p_BF;
-      filter_.P.middleRows<3>(foot_index(i)).setZero();
-      filter_.P.middleCols<3>(foot_index(i)).setZero();
-      filter_.P.diagonal().segment<3>(foot_index(i)).setConstant(squared(c.swing_foot_noise) * dt);
+      forget(foot_index(i), squared(c.swing_foot_noise) * dt);
     }
   }
 
   for (int i = 0; i < kFeet; ++i) {
     if (!in_contact_[i]) continue;
-    const bool given_up = rejected_time_[i] >= c.slip_timeout;
-    if (!slipping_[i] || given_up) {
+    if (!slipping_[i] || given_up(i)) {
       update(velocity_measurement(state_, imu, feet[i], foot_radius_),
              squared(c.foot_velocity_sigma) * (slipping_[i] ? c.slip_inflation : variance_scale[i]));
     }
@@ -223,19 +229,30 @@ void BaseEstimator::step_sample(const SensorSample& sample, double dt, const Con
   }
 }
 
-void BaseEstimator::gate(const ImuMean& imu, const FootMeasurement& foot, int index) noexcept {
+Vector3 BaseEstimator::gate(const ImuMean& imu, const FootMeasurement& foot, int index) noexcept {
   bool& slipping = slipping_[index];
   double& rejected_time = rejected_time_[index];
   slipping = false;
   if (!in_contact_[index]) {
     rejected_time = 0.0;
-    return;
+    return Vector3::Zero();
   }
   const ErrorMeasurement velocity = velocity_measurement(state_, imu, foot, foot_radius_);
   const Matrix3 R = squared(config_.foot_velocity_sigma) * Matrix3::Identity();
   slipping = !(filter_.innovation(velocity.z, velocity.H, R).nis <= config_.slip_gate);
   if (slipping) contact_time_[index] = 0.0;
   rejected_time = std::clamp(rejected_time + (slipping ? imu.dt : -imu.dt), 0.0, config_.slip_timeout);
+  return velocity.z;
+}
+
+bool BaseEstimator::given_up(int foot) const noexcept {
+  return slipping_[foot] && rejected_time_[foot] >= config_.slip_timeout;
+}
+
+void BaseEstimator::forget(int begin, double variance) noexcept {
+  filter_.P.middleRows<3>(begin).setZero();
+  filter_.P.middleCols<3>(begin).setZero();
+  filter_.P.diagonal().segment<3>(begin).setConstant(variance);
 }
 
 void BaseEstimator::update(const ErrorMeasurement& measurement, double variance) noexcept {

@@ -73,7 +73,11 @@ class BaseEstimator {
   FootMeasurement measure_foot(const SensorSample& sample, int foot, double dt) const noexcept;
   void step_sample(const SensorSample& sample, double dt, const ContactPlan& plan) noexcept;
   void advance(const ImuMean& imu) noexcept;
-  void gate(const ImuMean& imu, const FootMeasurement& foot, int index) noexcept;
+  /// Judges a foot by its velocity, whose residual [m/s] it returns.
+  Vector3 gate(const ImuMean& imu, const FootMeasurement& foot, int index) noexcept;
+  bool given_up(int foot) const noexcept;
+  /// The three parts of the error from `begin` on: uncorrelated, of this variance.
+  void forget(int begin, double variance) noexcept;
   void update(const ErrorMeasurement& measurement, double variance) noexcept;
   void write(const SensorSample& now, BaseEstimate& estimate) const noexcept;
 
