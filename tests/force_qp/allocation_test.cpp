@@ -1,0 +1,94 @@
+// A solve allocates nothing once the engine is set up, whatever its outcome. malloc itself is interposed: OSQP is C,
+// and Eigen's own guard is off in release builds.
+#include <atomic>
+#include <catch2/catch_test_macros.hpp>
+#include <cstddef>
+#include <limits>
+#include <random>
+
+#include "controller/force_qp/force_qp.hpp"
+#include "tests/force_qp/problems.hpp"
+
+namespace {
+std::atomic<long> allocations{0};
+}
+
+// glibc's own entry points, to which the interposed ones pass on.
+extern "C" {
+void* __libc_malloc(std::size_t size);
+void* __libc_calloc(std::size_t count, std::size_t size);
+void* __libc_realloc(void* block, std::size_t size);
+void* __libc_memalign(std::size_t alignment, std::size_t size);
+
+void* malloc(std::size_t size) noexcept {
+  ++allocations;
+  return __libc_malloc(size);
+}
+void* calloc(std::size_t count, std::size_t size) noexcept {
+  ++allocations;
+  return __libc_calloc(count, size);
+}
+void* realloc(void* block, std::size_t size) noexcept {
+  ++allocations;
+  return __libc_realloc(block, size);
+}
+void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
+  ++allocations;
+  return __libc_memalign(alignment, size);
+}
+int posix_memalign(void** block, std::size_t alignment, std::size_t size) noexcept {
+  ++allocations;
+  *block = __libc_memalign(alignment, size);
+  return 0;
+}
+}
+
+using namespace stance;
+using namespace stance::force_qp;
+using namespace stance::force_qp::test;
+
+TEST_CASE("InterposedMallocSeesAllocations") {
+  const long before = allocations;
+  const volatile std::size_t size = 1000;  // so that the compiler cannot do without
+  const std::vector<double> block(size);
+  CHECK(block.size() == size);
+  CHECK(allocations > before);
+}
+
+TEST_CASE("ASolveAllocatesNothing") {
+  for (const QpEngine which : {QpEngine::kOsqpCondensed, QpEngine::kOsqpSparse}) {
+    for (const int num_contacts : {1, 2, 3, 4}) {
+      Settings settings;
+      settings.engine = which;
+      std::mt19937_64 random(1);
+      std::vector<Problem> problems;
+      for (int tick = 0; tick < 40; ++tick) {
+        problems.push_back(num_contacts == 2 ? walking(10, tick, 0.2) : standing(10, num_contacts));
+        disturb(problems.back(), 5.0, random);
+        if (tick % 10 == 4) problems.back().friction = -1.0;
+        if (tick % 10 == 6) problems.back().x0(0) = std::numeric_limits<double>::quiet_NaN();
+        if (tick % 10 == 8) problems.back().stages[0].fz_min[0] = problems.back().stages[0].fz_max[0] = -1.0;
+      }
+      auto engine = make_force_qp(settings, problems.front().sizes, kWeight);
+      Solution solution(problems.front().sizes);
+      const long before = allocations;
+      long solved = 0;
+      for (const Problem& problem : problems) solved += engine->solve(problem, solution) == QpStatus::kSolved;
+      engine->reset();
+      CHECK(allocations == before);
+      CHECK(solved == 28);
+    }
+  }
+}
+
+TEST_CASE("AModelAllocatesNothing") {
+  const centroidal::Parameters parameters = body();
+  const centroidal::Linearisation at = stand_linearisation(4, true);
+  centroidal::Dynamics out;
+  const centroidal::ForceVector f = centroidal::ForceVector::Ones(12);
+  const long before = allocations;
+  centroidal::dynamics(parameters, at, out);
+  const double effort = centroidal::effort(f, f);
+  CHECK(allocations == before);
+  CHECK(effort > 0.0);
+}
