@@ -18,7 +18,6 @@ WorldSetup biped_world(double height);
 Scenario biped_scenario(const std::string& name);
 
 /// A command of `run_id` that answers the simulator's present state and holds the nominal pose.
-stance_msgs::joint_command_t hold_command(const config::RobotDescription& robot, const Simulator& simulator, double kp,
-                                          double kd);
+stance_msgs::joint_command_t hold_command(const config::RobotDescription& robot, const Simulator& simulator);
 
 }  // namespace stance::sim::test

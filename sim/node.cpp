@@ -1,0 +1,192 @@
+#include "sim/node.hpp"
+
+#include <poll.h>
+
+#include <algorithm>
+#include <cinttypes>
+#include <cstdio>
+#include <stance_msgs/run_info_t.hpp>
+#include <string_view>
+#include <utility>
+
+#include "sim/real_time.hpp"
+
+namespace stance::sim {
+namespace {
+
+constexpr std::int64_t kSecondNs = 1'000'000'000;
+constexpr auto kPeriodNs = static_cast<std::int64_t>(kControlPeriod * 1e9);
+static_assert(kPeriodNs == 10'000'000);
+
+const std::string kRobotState = "ROBOT_STATE";
+const std::string kTruth = "TRUTH";
+const std::string kUserCommand = "USER_COMMAND";
+const std::string kRunInfo = "RUN_INFO_SIMULATOR";
+
+template <typename Message>
+void encode(const Message& message, std::vector<std::uint8_t>& bytes) {
+  bytes.resize(static_cast<std::size_t>(message.getEncodedSize()));
+  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
+}
+
+/// FNV-1a, 64 bit, of the texts one after the other, in hexadecimal.
+std::string hash_of(std::initializer_list<std::string_view> texts) {
+  std::uint64_t hash = 14695981039346656037ULL;
+  for (const std::string_view text : texts) {
+    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
+  }
+  std::array<char, 17> digits{};
+  std::snprintf(digits.data(), digits.size(), "%016" PRIx64, hash);
+  return digits.data();
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> encode_run_info(const config::RobotDescription& robot, const Scenario& scenario,
+                                          const SimulatorOptions& simulator_options, const std::string& options) {
+  stance_msgs::run_info_t info{};
+  info.utime = simulator_options.start_utime;
+  info.seq = 1;
+  info.run_id = simulator_options.run_id;
+  info.seed = static_cast<std::int64_t>(simulator_options.seed);
+  info.program = "stance-sim";
+  info.version = STANCE_VERSION;
+  info.source = STANCE_COMMIT;
+  info.build = STANCE_BUILD;
+  info.robot = robot.name;
+  info.options = options;
+  info.urdf = robot.urdf_text;
+  info.configuration = robot.yaml_text;
+  info.scenario = scenario.text;
+  info.input_hash = hash_of({robot.urdf_text, robot.yaml_text, scenario.text});
+  std::vector<std::uint8_t> bytes;
+  encode(info, bytes);
+  return bytes;
+}
+
+Node::Node(lcm::LCM& lcm, Simulator& simulator, std::vector<std::uint8_t> run_info)
+    : lcm_(lcm), simulator_(simulator), run_info_(std::move(run_info)) {
+  constexpr int queue = 16;
+  lcm_.subscribe("JOINT_COMMAND", &Node::on_command, this)->setQueueCapacity(queue);
+  lcm_.subscribe("FORCE_PLAN", &Node::on_plan, this)->setQueueCapacity(queue);
+  lcm_.subscribe("PUSH", &Node::on_push, this)->setQueueCapacity(queue);
+}
+
+void Node::on_command(const lcm::ReceiveBuffer*, const std::string&, const stance_msgs::joint_command_t* command) {
+  // A refused command is an answer, too: the drives do without it.
+  simulator_.accept(*command);
+  const bool ours = command->run_id == simulator_.state().run_id && command->state_seq <= simulator_.state().seq;
+  if (ours) answered_seq_ = std::max(answered_seq_, command->state_seq);
+}
+
+void Node::on_plan(const lcm::ReceiveBuffer*, const std::string&, const stance_msgs::force_plan_t* plan) {
+  simulator_.accept(*plan);
+}
+
+void Node::on_push(const lcm::ReceiveBuffer*, const std::string&, const stance_msgs::push_t* push) {
+  simulator_.accept(*push);
+}
+
+void Node::publish_state() {
+  lcm_.publish(kRobotState, state_bytes_.data(), static_cast<unsigned>(state_bytes_.size()));
+}
+
+void Node::publish_truth() {
+  encode(simulator_.truth(), truth_bytes_);
+  lcm_.publish(kTruth, truth_bytes_.data(), static_cast<unsigned>(truth_bytes_.size()));
+}
+
+void Node::publish_instant() {
+  if (const auto* command = simulator_.user_command()) {
+    encode(*command, user_command_bytes_);
+    lcm_.publish(kUserCommand, user_command_bytes_.data(), static_cast<unsigned>(user_command_bytes_.size()));
+  }
+  encode(simulator_.state(), state_bytes_);
+  publish_state();
+  publish_truth();
+}
+
+void Node::housekeeping() {
+  const std::int64_t now = monotonic_ns();
+  if (now >= next_run_info_ns_) {
+    lcm_.publish(kRunInfo, run_info_.data(), static_cast<unsigned>(run_info_.size()));
+    next_run_info_ns_ = now + kSecondNs;
+  }
+  const bool damped = simulator_.truth().drives_damped != 0;
+  if (damped && !was_damped_) {
+    ++report_.times_damped;
+    std::fprintf(stderr, "stance-sim: no valid command: the drives damp (at %.2f s)\n", simulator_.time());
+  }
+  was_damped_ = damped;
+}
+
+void Node::take_messages_until(std::int64_t deadline_ns, const std::atomic<bool>& stop) {
+  pollfd readable{lcm_.getFileno(), POLLIN, 0};
+  while (!stop.load(std::memory_order_relaxed)) {
+    const std::int64_t left = std::max<std::int64_t>(deadline_ns - monotonic_ns(), 0);
+    const timespec timeout{left / kSecondNs, left % kSecondNs};
+    if (ppoll(&readable, 1, &timeout, nullptr) <= 0) return;  // the deadline, or a signal
+    lcm_.handle();
+  }
+}
+
+bool Node::wait_for_answer(const LockstepTiming& timing, const std::atomic<bool>& stop) {
+  const auto ns = [](double seconds) { return static_cast<std::int64_t>(seconds * 1e9); };
+  const std::int64_t start = monotonic_ns();
+  const std::int64_t end = start + ns(answered_seq_ == 0 ? timing.first_answer : timing.silence);
+  std::int64_t repeat = start + ns(timing.repeat);
+  pollfd readable{lcm_.getFileno(), POLLIN, 0};
+  while (answered_seq_ < simulator_.state().seq) {
+    const std::int64_t now = monotonic_ns();
+    if (stop.load(std::memory_order_relaxed) || now >= end) return false;
+    if (now >= repeat) {
+      publish_state();
+      housekeeping();
+      repeat = now + ns(timing.repeat);
+    }
+    const std::int64_t left = std::max<std::int64_t>(std::min(repeat, end) - now, 0);
+    const timespec timeout{left / kSecondNs, left % kSecondNs};
+    if (ppoll(&readable, 1, &timeout, nullptr) > 0) lcm_.handle();
+  }
+  return true;
+}
+
+NodeReport Node::run_lockstep(std::int64_t periods, const LockstepTiming& timing, const std::atomic<bool>& stop) {
+  housekeeping();
+  for (std::int64_t k = 0; k < periods; ++k) {
+    publish_instant();
+    housekeeping();
+    if (!wait_for_answer(timing, stop)) {
+      report_.ending = stop.load(std::memory_order_relaxed) ? Ending::kStopped : Ending::kSilence;
+      return report_;
+    }
+    simulator_.advance();
+  }
+  publish_truth();
+  return report_;
+}
+
+NodeReport Node::run_real_time(std::int64_t periods, std::int64_t start_ns, const std::atomic<bool>& stop) {
+  constexpr auto deadline_after = static_cast<std::int64_t>(kCommandDeadline * 1e9);
+  constexpr auto late = static_cast<std::int64_t>(kLate * 1e9);
+  housekeeping();
+  for (std::int64_t k = 0; k < periods; ++k) {
+    const std::int64_t instant = start_ns + k * kPeriodNs;
+    while (!stop.load(std::memory_order_relaxed) && monotonic_ns() < instant) sleep_until(instant);
+    if (stop.load(std::memory_order_relaxed)) {
+      report_.ending = Ending::kStopped;
+      return report_;
+    }
+    const std::int64_t lateness = monotonic_ns() - instant;
+    publish_instant();
+    if (lateness > late) ++report_.late_instants;
+    report_.worst_lateness = std::max(report_.worst_lateness, static_cast<double>(lateness) * 1e-9);
+    housekeeping();
+    take_messages_until(instant + deadline_after, stop);
+    simulator_.advance();
+  }
+  publish_truth();
+  return report_;
+}
+
+}  // namespace stance::sim

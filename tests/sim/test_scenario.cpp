@@ -1,0 +1,95 @@
+#include <catch2/catch_test_macros.hpp>
+#include <string>
+
+#include "controller/config/strict_yaml.hpp"
+#include "tests/sim/robots.hpp"
+
+namespace stance::sim {
+namespace {
+
+std::string stand_text() { return config::read_text(config::share_directory() / "sim/scenarios/biped/stand.yaml"); }
+
+/// The message of the error that `text` with `from` replaced by `to` makes; empty where it makes none.
+std::string error_of(const std::string& from, const std::string& to) {
+  std::string text = stand_text();
+  const auto at = text.find(from);
+  REQUIRE(at != std::string::npos);
+  text.replace(at, from.size(), to);
+  try {
+    static_cast<void>(scenario_from_text(text, "stand.yaml"));
+  } catch (const config::ConfigError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+bool names(const std::string& message, const std::string& key) {
+  INFO(message);
+  return message.find("stand.yaml") != std::string::npos && message.find(key) != std::string::npos;
+}
+
+}  // namespace
+
+TEST_CASE("EveryScenarioOfTheBipedLoads") {
+  for (const char* name : {"stand", "stand_quiet", "single_body"}) {
+    const Scenario scenario = load_scenario("biped", name);
+    CHECK(scenario.duration == 20.0);
+    CHECK(scenario.robot == "biped");
+    CHECK(scenario.text.find("duration: 20.0") != std::string::npos);
+  }
+}
+
+TEST_CASE("TheStandScenarioPushesHalfANewtonSecondForwardAndThreeSideways") {
+  const Scenario scenario = load_scenario("biped", "stand");
+  REQUIRE(scenario.pushes.size() == 2);
+  CHECK((scenario.pushes[0].force_W * scenario.pushes[0].duration - Vector3(0.5, 0.0, 0.0)).norm() < 1e-12);
+  CHECK((scenario.pushes[1].force_W * scenario.pushes[1].duration - Vector3(0.0, 3.0, 0.0)).norm() < 1e-12);
+  CHECK(scenario.command_delay_steps == 1);
+  CHECK(scenario.sensors.delay_steps == 1);
+  CHECK(scenario.sensors.contact_delay_steps == 5);
+  CHECK(scenario.sensors.noise.joint_position_resolution == 5e-4);
+  CHECK(load_scenario("biped", "stand_quiet").sensors.noise.gyro_white == 0.0);
+  CHECK(load_scenario("biped", "single_body").plant == Plant::kSingleBody);
+}
+
+TEST_CASE("ScenarioErrorsNameTheKey") {
+  CHECK(names(error_of("duration: 20.0", "durration: 20.0"), "duration is missing"));
+  CHECK(names(error_of("friction: 0.7", "friction: 0.7\nfrictoin: 0.7"), "frictoin"));
+  CHECK(names(error_of("friction: 0.7", "friction: -0.1"), "friction is -0.1"));
+  CHECK(names(error_of("friction: 0.7", "friction: .nan"), "friction"));
+  CHECK(names(error_of("plant: multibody", "plant: multybody"), "plant is 'multybody'"));
+  CHECK(names(error_of("command_latency: 0.001", "command_latency: 0.0015"), "command_latency is 0.0015"));
+  CHECK(names(error_of("command_latency: 0.001", "command_latency: 0.2"), "command_latency"));
+  CHECK(names(error_of("trunk: 1.0", "trunk: 0.0"), "mass_factor.trunk"));
+  CHECK(names(error_of("gyro_white: 0.003", "gyro_white: -1"), "sensors.noise.gyro_white"));
+  CHECK(names(error_of("gyro_bias: 0.002", "gyro_bais: 0.002"), "sensors.noise.gyro_bias is missing"));
+  CHECK(names(error_of("  contact_delay: 0.005", "  contact_delay: 0.0052"), "sensors.contact_delay"));
+  CHECK(names(error_of("force_W: [5, 0, 0]", "force_W: [5, 0]"), "pushes[1].force_W"));
+  CHECK(names(error_of("time: 8.0", "time: 18.0"), "pushes must stand in the order"));
+  CHECK(names(error_of("duration: 0.1, force_W: [0", "duration: 0, force_W: [0"), "pushes[2].duration"));
+  CHECK(names(error_of("behaviour: stand", "behaviour: stend"), "commands[1].behaviour is 'stend'"));
+  CHECK(names(error_of("{time: 0.0, b", "{time: 0.005, b"), "commands[1].time"));
+  CHECK(names(error_of("foot_clearance: -0.0003", "foot_clearance: -1"), "initial_state.foot_clearance"));
+}
+
+TEST_CASE("AWordForNoiseMustBeNone") {
+  std::string text = config::read_text(config::share_directory() / "sim/scenarios/biped/stand_quiet.yaml");
+  const auto at = text.find("noise: none");
+  REQUIRE(at != std::string::npos);
+  text.replace(at, 11, "noise: some");
+  try {
+    static_cast<void>(scenario_from_text(text, "quiet.yaml"));
+    FAIL("took it");
+  } catch (const config::ConfigError& error) {
+    CHECK(std::string(error.what()).find("sensors.noise is 'some'") != std::string::npos);
+  }
+}
+
+TEST_CASE("AnUnknownScenarioAndAnotherRobotsAreErrors") {
+  CHECK_THROWS_AS(load_scenario("biped", "no_such"), config::ConfigError);
+  const auto file = config::share_directory() / "sim/scenarios/biped/stand.yaml";
+  CHECK_NOTHROW(load_scenario("biped", file.string()));
+  CHECK_THROWS_AS(load_scenario("catcher", file.string()), config::ConfigError);
+}
+
+}  // namespace stance::sim
