@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from . import __version__
-from .errors import GOOD, LIMIT_VIOLATED, StanceError
+from .errors import GOOD, LIMIT_VIOLATED, USAGE, StanceError
 
 INTERRUPTED = 130
 
@@ -50,9 +50,9 @@ def _run(options: argparse.Namespace) -> int:
     from .run import RunRequest, progress_bar, record
 
     ensure(options.network, options.given)
-    stamp = time.strftime("%Y%m%d-%H%M%S")
+    name = f"{time.strftime('%Y%m%d-%H%M%S')}-{options.robot}-{Path(options.scenario).stem}"
     request = RunRequest(
-        out=options.out or Path("runs") / f"{stamp}-{options.robot}-{options.scenario}",
+        out=options.out or _fresh_directory(name),
         robot=options.robot,
         scenario=options.scenario,
         realtime=not options.lockstep,
@@ -67,7 +67,143 @@ def _run(options: argparse.Namespace) -> int:
     if outcome.interrupted:
         _say(options, f"interrupted after {outcome.simulated:.2f} s; the log is {outcome.log}")
         return INTERRUPTED
-    return GOOD if not outcome.fell else LIMIT_VIOLATED
+    if options.no_report:
+        result = {"log": str(outcome.log), "fell": outcome.fell, "simulated_s": outcome.simulated}
+        _print(options, result, lambda: f"log      {outcome.log}\n{'FELL' if outcome.fell else 'did not fall'}")
+        return LIMIT_VIOLATED if outcome.fell else GOOD
+    return _write_report(options, outcome.log, outcome.log.parent)
+
+
+def _fresh_directory(name: str) -> Path:
+    """runs/<name>, or with a number after it where there is one already."""
+    path = Path("runs") / name
+    for number in range(2, 1000):
+        if not path.exists():
+            break
+        path = Path("runs") / f"{name}-{number}"
+    return path
+
+
+def _write_report(options: argparse.Namespace, log: Path, out: Path) -> int:
+    from .log import Log
+    from .report import analyse, write
+
+    analysis = analyse(Log.open(log), options.run, options.limits)
+    _say(options, "drawing the report ...")
+    written = write(analysis, out)
+    verdict = analysis.verdict
+    result = {
+        "log": str(log),
+        "report": str(written.report),
+        "summary": str(written.summary),
+        "plots": str(written.plots),
+        "verdict": verdict.as_dict(),
+        "metrics": analysis.metrics.as_dict(),
+    }
+
+    def text() -> str:
+        places = [("log", log), ("report", written.report), ("summary", written.summary), ("plots", written.plots)]
+        return "\n".join([verdict.as_text(), "", *(f"{name:<9}{place}" for name, place in places)])
+
+    _print(options, result, text)
+    return GOOD if verdict.passed else LIMIT_VIOLATED
+
+
+def _report(options: argparse.Namespace) -> int:
+    return _write_report(options, options.log, options.out or options.log.parent)
+
+
+def _check(options: argparse.Namespace) -> int:
+    from .log import Log
+    from .report import analyse
+
+    analysis = analyse(Log.open(options.log), options.run, options.limits)
+    _print(options, analysis.verdict.as_dict(), analysis.verdict.as_text)
+    return GOOD if analysis.verdict.passed else LIMIT_VIOLATED
+
+
+def _plot(options: argparse.Namespace) -> int:
+    from dataclasses import replace
+
+    from .log import Log
+    from .picture import picture
+    from .report import analyse, figures, write_plots
+    from .style import render
+
+    analysis = analyse(Log.open(options.log), options.run, options.limits)
+    if options.list:
+        names = list(figures(analysis))
+        _print(options, names, lambda: "\n".join(names))
+        return GOOD
+    if options.first is not None or options.last is not None:
+        analysis = replace(analysis, run=analysis.run.between(options.first, options.last))
+    out = options.out or options.log.parent / "plots"
+    if options.picture and (options.at or options.view):
+        out.mkdir(parents=True, exist_ok=True)
+        path = out / f"picture.{options.format}"
+        path.write_bytes(render(picture(analysis.run, options.at, options.view), options.format))
+        written = [path]
+    else:
+        only = ["picture"] if options.picture else options.only
+        written = write_plots(analysis, out, only, options.format)
+    _print(options, [str(path) for path in written], lambda: "\n".join(map(str, written)))
+    return GOOD
+
+
+def _replay(options: argparse.Namespace) -> int:
+    from .replay import replay, select, verify
+
+    if options.verify:
+        done = verify(options.log, capture=options.json or options.silent)
+        if options.json:
+            print(
+                json.dumps({"equal": done.returncode == 0, "exit_code": done.returncode, "text": done.stdout.strip()})
+            )
+        return done.returncode
+    from .log import Log
+    from .network import announced, ensure
+    from .run import progress_bar
+
+    log = Log.open(options.log)
+    rows = select(log, options.channels, options.first, options.last)
+    ensure(options.network, options.given)
+    with announced("stance replay"), progress_bar(options.silent) as progress:
+        done_playing = replay(log, rows, options.speed, progress=progress)
+    result = {
+        "messages": done_playing.messages,
+        "channels": done_playing.channels,
+        "duration_s": done_playing.duration,
+        "wall_s": done_playing.wall,
+    }
+    words = f"{done_playing.messages} messages, {done_playing.duration:.2f} s of the log in {done_playing.wall:.2f} s"
+    _print(options, result, lambda: words)
+    return GOOD
+
+
+def _export(options: argparse.Namespace) -> int:
+    from .export import export
+    from .log import Log
+
+    run = Log.open(options.log).run(options.run)
+    default = options.log.with_suffix(".mat") if options.format == "mat" else options.log.parent / options.format
+    written = export(run, options.format, options.out or default)
+    _print(options, [str(path) for path in written], lambda: "\n".join(map(str, written)))
+    return GOOD
+
+
+def _doctor(options: argparse.Namespace) -> int:
+    from dataclasses import asdict
+
+    from .doctor import examine
+
+    found = examine()
+
+    def text() -> str:
+        marks = {(True, True): "ok     ", (True, False): "ok     ", (False, True): "MISSING", (False, False): "note   "}
+        return "\n".join(f"{marks[one.good, one.needed]} {one.name:<20} {one.text}" for one in found)
+
+    _print(options, [asdict(one) for one in found], text)
+    return GOOD if all(one.good or not one.needed for one in found) else USAGE
 
 
 def _info(options: argparse.Namespace) -> int:
@@ -136,19 +272,69 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--solver", help="the controller's force QP engine")
     run.add_argument("--plant", help="the simulator's plant")
     run.add_argument("--out", type=Path, metavar="DIR", help="where everything goes (default: runs/<time>-...)")
+    run.add_argument("--no-report", action="store_true", help="only the log")
+    _add_limits(run)
     _add_network(run)
+    run.set_defaults(run=None)
 
     info = add("info", _info, "What a log holds: channels, counts, rates, gaps, versions, and what was skipped.")
     _add_log(info)
 
+    report = add("report", _report, "Writes report.html, summary.json and plots/ for a log; exit 1 by its verdict.")
+    _add_log(report, with_run=True)
+    _add_limits(report)
+    report.add_argument("--out", type=Path, metavar="DIR", help="where to (default: beside the log)")
+
+    check = add("check", _check, "Judges a run by its limits; exit 1 where one is violated.")
+    _add_log(check, with_run=True)
+    _add_limits(check)
+
+    plot = add("plot", _plot, "Draws the plots of a run.")
+    _add_log(plot, with_run=True)
+    _add_limits(plot)
+    _add_span(plot, "the run's start")
+    plot.add_argument("--only", nargs="+", metavar="PLOT", help="these plots (--list names them)")
+    plot.add_argument("--list", action="store_true", help="names of the plots that this log can give")
+    plot.add_argument("--picture", action="store_true", help="only the drawing of the robot taking its pushes")
+    plot.add_argument("--at", nargs="+", type=float, metavar="S", help="with --picture: the instants to draw")
+    plot.add_argument("--view", choices=("side", "front"), help="with --picture: from where")
+    plot.add_argument("--format", choices=("png", "svg", "pdf"), default="png")
+    plot.add_argument("--out", "--save-plot", type=Path, metavar="DIR", help="where to (default: plots/ by the log)")
+
+    replay = add("replay", _replay, "Publishes a log again over LCM, or verifies that the controller decides the same.")
+    _add_log(replay)
+    replay.add_argument("--channels", nargs="+", metavar="NAME", help="only these; patterns such as 'CONTROLLER_*'")
+    replay.add_argument("--speed", type=_not_negative, default=1.0, help="times the log's own pace; 0: no waiting")
+    _add_span(replay, "the log's first event")
+    replay.add_argument("--verify", action="store_true", help="compare every byte that the controller would publish")
+    _add_network(replay)
+
+    export = add("export", _export, "Writes a run's channels for other tools.")
+    export.add_argument("format", choices=("parquet", "csv", "mat"))
+    _add_log(export, with_run=True)
+    export.add_argument("--out", type=Path, metavar="PATH", help="a directory, or the .mat file (default: by the log)")
+
     shell = add("shell", _shell, "A shell, or a command, in the network of a running `stance run` or `stance replay`.")
     shell.add_argument("--pid", type=int, help="of the process to join (default: the newest)")
     shell.add_argument("words", nargs=argparse.REMAINDER, metavar="COMMAND", help="instead of a shell")
+
+    add("doctor", _doctor, "What this machine has and lacks for a run, one line each.")
     return parser
 
 
-def _add_log(parser: argparse.ArgumentParser) -> None:
+def _add_log(parser: argparse.ArgumentParser, with_run: bool = False) -> None:
     parser.add_argument("log", type=Path, metavar="LOG", help="an LCM log")
+    if with_run:
+        parser.add_argument("--run", type=int, metavar="ID", help="run_id, where the log holds more than one run")
+
+
+def _add_limits(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--limits", type=Path, metavar="FILE", help="YAML (default: the robot's and scenario's own)")
+
+
+def _add_span(parser: argparse.ArgumentParser, origin: str) -> None:
+    parser.add_argument("--from", dest="first", type=float, metavar="S", help=f"seconds from {origin}")
+    parser.add_argument("--to", dest="last", type=float, metavar="S", help=f"seconds from {origin}")
 
 
 def _add_network(parser: argparse.ArgumentParser) -> None:
@@ -164,4 +350,11 @@ def _positive(text: str) -> float:
     value = float(text)
     if not value > 0.0:
         raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
+
+
+def _not_negative(text: str) -> float:
+    value = float(text)
+    if not value >= 0.0:
+        raise argparse.ArgumentTypeError(f"{text} is below 0")
     return value

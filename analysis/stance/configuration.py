@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import yaml
@@ -76,5 +77,10 @@ def title(run: Run) -> str:
     """Robot and scenario, for headings."""
     info = run.controller or run.simulator
     name = info.robot if info is not None else "robot"
-    chosen = option(run, "--scenario")
+    chosen = scenario_name(run)
     return f"{name}, {chosen}" if chosen else name
+
+
+def scenario_name(run: Run) -> str:
+    """Of the scenario that ran, without path and suffix; empty where the log does not say."""
+    return Path(option(run, "--scenario") or "").stem

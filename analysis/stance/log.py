@@ -327,6 +327,10 @@ class Log:
         rows = np.flatnonzero(~np.isin(self._keys[channel]["run_id"], self.run_ids) & (messages.received <= received))
         return messages.take(rows[np.argmax(messages.received[rows])][None]) if len(rows) else None
 
+    def payload_bytes(self, offset: int, length: int) -> bytes:
+        """What stands in the file at `offset`: an event's payload by `index.data_offset` and `index.data_length`."""
+        return bytes(self._buffer[offset : offset + length])
+
     # ---- reading ---------------------------------------------------------------------------------------------------
 
     def _read(self) -> LogReport:

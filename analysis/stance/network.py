@@ -79,6 +79,16 @@ def namespace_command() -> list[str] | None:
     return command if tried.returncode == 0 else None
 
 
+def refusal() -> str:
+    """Why there is no namespace to be had, and what to do."""
+    missing = [name for name in ("unshare", "ip") if shutil.which(name) is None]
+    if missing:
+        return (
+            f"no private network: {' and '.join(missing)} missing (apt-get install util-linux iproute2); or {_HOW_TO}"
+        )
+    return f"no private network: this machine refuses network namespaces; {_HOW_TO}"
+
+
 def ensure(mode: str, arguments: Sequence[str]) -> None:
     """Makes LCM's network usable for this process, or raises MissingError with what to do.
 
@@ -94,9 +104,7 @@ def ensure(mode: str, arguments: Sequence[str]) -> None:
         return
     command = namespace_command()
     if command is None:
-        missing = [name for name in ("unshare", "ip") if shutil.which(name) is None]
-        why = f"{' and '.join(missing)} missing (util-linux, iproute2)" if missing else "refused by this machine"
-        raise MissingError(f"no private network: a network namespace is {why}; {_HOW_TO}")
+        raise MissingError(refusal())
     os.environ[INSIDE] = "1"
     os.environ[RUNTIME_DIRECTORY] = str(runtime_directory())
     sys.stdout.flush()

@@ -201,6 +201,7 @@ def draw(
     ax.set_xticks([])
     ax.set_yticks([])
     ax.grid(False)
+    ax.patch.set_visible(False)  # or it hides what stands below its neighbour
     for spine in ax.spines.values():
         spine.set_visible(False)
 

@@ -316,13 +316,13 @@ class _Interruption:
 
 @contextlib.contextmanager
 def progress_bar(silent: bool) -> Iterator[Progress | None]:
-    """A progress bar on stderr, fed by `record`; none when `silent`."""
+    """A progress bar on stderr for `record` and `replay`; none when `silent`."""
     if silent:
         yield None
         return
     from tqdm import tqdm
 
-    layout = "{l_bar}{bar}| {n:.1f}/{total:.1f} s simulated [{elapsed}]"
+    layout = "{l_bar}{bar}| {n:.1f}/{total:.1f} s [{elapsed}]"
     with tqdm(total=0.0, bar_format=layout, disable=None) as bar:  # disable=None: only where stderr is a terminal
 
         def show(simulated: float, duration: float | None) -> None:

@@ -12,7 +12,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 from stance.events import SYNC
+from stance.log import Log
 from stance.messages import message_type
+from stance.series import Run
 from stance.urdf import Robot, parse_urdf, rotation_from_rpy, transform
 
 URDF = (Path(__file__).parents[2] / "robots/biped/biped.urdf").read_text()
@@ -66,6 +68,25 @@ def leg_ik(robot: Robot, side: str, p_BF: npt.NDArray[np.float64], pitch_sum: fl
     knee = np.arccos(np.clip((distance**2 - 2 * 0.26**2) / (2 * 0.26**2), -1, 1))
     q1 = np.arctan2(-ankle[0], ankle[1]) - knee / 2
     return np.array([q0, q1, knee, pitch_sum - q1 - knee])
+
+
+def run_of(channels: dict[str, npt.NDArray[np.void]], run_id: int = RUN_ID) -> Run:
+    """A run that holds just these messages, as it reads back from a log."""
+    events = []
+    for channel, messages in channels.items():
+        messages["run_id"] = run_id
+        events += [(WALL + int(message["utime"]), channel, message.tobytes()) for message in messages]
+    for channel, program in (("RUN_INFO_SIMULATOR", "stance-sim"), ("RUN_INFO_CONTROLLER", "stance-controller")):
+        events.append((WALL, channel, Synthetic(run_id=run_id).run_info(program, 0, 1)))
+    return Log.from_bytes(encode_log(sorted(events))).run()
+
+
+def ticked(type_name: str, count: int) -> npt.NDArray[np.void]:
+    """Zeroed messages at the control period, seq from 1."""
+    result = records(type_name, count)
+    result["seq"] = np.arange(1, count + 1)
+    result["utime"] = START + np.arange(count) * round(PERIOD * 1e6)
+    return result
 
 
 @dataclass

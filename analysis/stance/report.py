@@ -1,0 +1,241 @@
+"""One file that says what a run was and how it went: report.html, with summary.json and the plots beside it."""
+
+from __future__ import annotations
+
+import base64
+import json
+from collections.abc import Callable
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import jinja2
+from matplotlib.figure import Figure
+
+from . import __version__, configuration, plots, style
+from .check import Verdict, judge, limits_file, load_limits
+from .errors import StanceError
+from .log import Log
+from .metrics import Metrics, Percentiles, measure
+from .picture import picture
+from .series import Run
+from .timeline import Event, timeline
+
+SCHEMA = {"schema": "stance.summary", "version": 1}
+TITLES = {
+    "picture": "The robot",
+    "timing": "Tick period and stage times",
+    "center_of_mass": "Centre of mass and base",
+    "forces": "Ground reaction forces",
+    "gait": "Contacts",
+    "joints": "Joints",
+    "force_qp": "Force QP",
+}
+MAX_EVENTS = 400  # rows of the report's table of events
+
+
+@dataclass(frozen=True)
+class Analysis:
+    """A run, measured and judged."""
+
+    run: Run
+    metrics: Metrics
+    verdict: Verdict
+    events: list[Event]
+
+    def summary(self) -> dict[str, Any]:
+        """What summary.json holds."""
+        infos = {"simulator": self.run.simulator, "controller": self.run.controller}
+        texts = ("urdf", "configuration", "scenario")
+        return {
+            **SCHEMA,
+            "stance": __version__,
+            "log": self.run.name,
+            "programs": {
+                name: {key: value for key, value in asdict(info).items() if key not in texts}
+                for name, info in infos.items()
+                if info is not None
+            },
+            "verdict": self.verdict.as_dict(),
+            "metrics": self.metrics.as_dict(),
+            "events": [asdict(event) for event in self.events],
+        }
+
+
+@dataclass(frozen=True)
+class Written:
+    """Where everything went."""
+
+    report: Path
+    summary: Path
+    plots: Path
+
+
+def analyse(log: Log, run_id: int | None = None, limits: Path | None = None) -> Analysis:
+    """Measures and judges a run of a log; without `limits`, by the list of its robot and scenario.
+
+    Raises UnreadableError where the log has no such run, and StanceError where the limits cannot be used.
+    """
+    run = log.run(run_id)
+    measured = measure(run, log.report)
+    info = run.controller or run.simulator
+    chosen = limits or limits_file(info.robot if info else "", configuration.scenario_name(run))
+    verdict = judge(measured.as_dict(), load_limits(chosen), chosen.name)
+    return Analysis(run, measured, verdict, timeline(run))
+
+
+def figures(analysis: Analysis) -> dict[str, Callable[[], Figure]]:
+    """name → how to draw it: the summary card, the picture where the log can give it, and every plot."""
+    run = analysis.run
+    found: dict[str, Callable[[], Figure]] = {
+        "summary_card": lambda: plots.summary_card(run, analysis.metrics, analysis.verdict)
+    }
+    if "TRUTH" in run and configuration.robot(run) is not None:
+        found["picture"] = lambda: picture(run)
+    for name, draw in plots.PLOTS.items():
+        found[name] = lambda draw=draw: draw(run)  # type: ignore[misc]
+    return found
+
+
+def write_plots(analysis: Analysis, directory: Path, only: list[str] | None = None, kind: str = "png") -> list[Path]:
+    """Draws into `directory`: every plot, or those named. Raises StanceError where one is unknown."""
+    available = figures(analysis)
+    for name in only or []:
+        if name not in available:
+            raise StanceError(f"no plot {name!r} for this log: {', '.join(available)}")
+    directory.mkdir(parents=True, exist_ok=True)
+    written = []
+    for name in only or available:
+        path = directory / f"{name}.{kind}"
+        path.write_bytes(style.render(available[name](), kind))
+        written.append(path)
+    return written
+
+
+def write(analysis: Analysis, directory: Path) -> Written:
+    """Writes report.html, summary.json and plots/ into `directory`."""
+    images = write_plots(analysis, directory / "plots")
+    summary = directory / "summary.json"
+    summary.write_text(json.dumps(analysis.summary(), indent=2) + "\n")
+    report = directory / "report.html"
+    report.write_text(render(analysis, {image.stem: image.read_bytes() for image in images}))
+    return Written(report, summary, directory / "plots")
+
+
+def render(analysis: Analysis, images: dict[str, bytes]) -> str:
+    """The report as one HTML page; `images` are PNG by plot name."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("stance"), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
+    )
+    embedded = {
+        name: "data:image/png;base64," + base64.b64encode(data).decode("ascii") for name, data in images.items()
+    }
+    return environment.get_template("report.html.j2").render(
+        analysis=analysis,
+        run=analysis.run,
+        metrics=analysis.metrics,
+        verdict=analysis.verdict,
+        title=configuration.title(analysis.run),
+        tables=tables(analysis.metrics),
+        events=analysis.events[:MAX_EVENTS],
+        hidden_events=max(len(analysis.events) - MAX_EVENTS, 0),
+        images=embedded,
+        titles=TITLES,
+        version=__version__,
+    )
+
+
+@dataclass(frozen=True)
+class Table:
+    title: str
+    head: list[str]
+    rows: list[list[str]]
+
+
+def tables(metrics: Metrics) -> list[Table]:
+    """The metrics for people, in the order of the report."""
+    found = [Table("Motion", ["figure", "value"], _motion(metrics))]
+    if metrics.timing is not None:
+        timing = metrics.timing
+        rows = [
+            _percentile_row("tick, wake-up to published", timing.tick_us),
+            _percentile_row("CPU time of the tick", timing.cpu_us),
+            _percentile_row("wake-up after the deadline", timing.wake_latency_us),
+            _percentile_row("|period less nominal|", timing.period_jitter_us),
+            _percentile_row("state's stamp to command", timing.state_to_command_us),
+        ]
+        rows += [_percentile_row(f"stage {name}", found) for name, found in timing.stage_us.items()]
+        found.append(Table("Time [µs]", ["quantity", "p50", "p99", "p99.9", "max"], [row for row in rows if row]))
+    if metrics.qp is not None:
+        found.append(Table("Force QP", ["figure", "value"], _force_qp(metrics)))
+    if metrics.joints is not None:
+        rows = [
+            [use.name, *map(_percent, (use.torque_share_max, use.speed_share_max, use.position_share_max))]
+            for use in metrics.joints.each
+        ]
+        found.append(Table("Joints: largest share of the limit", ["joint", "torque", "speed", "position"], rows))
+    channels = [
+        [use.name, f"{use.count}", f"{use.rate_hz:.1f}", f"{use.missing}", f"{use.restarts}"]
+        for use in metrics.channels
+    ]
+    found.append(Table("Channels", ["channel", "messages", "rate [Hz]", "missing", "restarts"], channels))
+    counts = [[f"fault: {name.replace('_', ' ')}", f"{count}"] for name, count in metrics.faults.items()]
+    counts += [[f"command refused: {name.replace('_', ' ')}", f"{n}"] for name, n in metrics.refused.items()]
+    found.append(Table("Counts", ["what", "ticks or messages"], counts))
+    return [table for table in found if table.rows]
+
+
+def _motion(metrics: Metrics) -> list[list[str]]:
+    rows = [["duration", f"{metrics.duration:.2f} s"]]
+    if metrics.trunk is not None:
+        rows.append(["trunk tilt, largest", f"{metrics.trunk.tilt_max_deg:.2f}°"])
+        rows.append(["trunk tilt, rms", f"{metrics.trunk.tilt_rms_deg:.2f}°"])
+        rows.append(["trunk height, least", f"{metrics.trunk.height_min:.3f} m"])
+    if metrics.center_of_mass is not None:
+        com = metrics.center_of_mass
+        rows.append(["centre of mass from its reference, largest", f"{1000 * com.error_max:.1f} mm"])
+        rows.append(["centre of mass from its reference, rms", f"{1000 * com.error_rms:.1f} mm"])
+    if metrics.force_error is not None:
+        rows.append(["contact force less planned, rms", f"{metrics.force_error.rms:.2f} N"])
+        rows.append(["contact force less planned, largest", f"{metrics.force_error.max:.1f} N"])
+    friction = metrics.friction
+    if friction.planned_share_max is not None:
+        rows.append([f"friction cone used by the plan (µ = {friction.mu:g})", _percent(friction.planned_share_max)])
+    if friction.measured_ratio_max is not None:
+        rows.append(["tangential over normal force, true, largest", f"{friction.measured_ratio_max:.3f}"])
+    if metrics.estimator is not None:
+        error = metrics.estimator
+        rows.append(["estimated position, error rms", f"{1000 * error.position_rms:.1f} mm"])
+        rows.append(["estimated position, drift", f"{1000 * error.position_drift:.1f} mm"])
+        rows.append(["estimated velocity, error rms", f"{1000 * error.velocity_rms:.1f} mm/s"])
+        rows.append(["estimated tilt, largest error", f"{error.tilt_max_deg:.3f}°"])
+    if metrics.drives_damped is not None:
+        rows.append(["drives damped", f"{metrics.drives_damped:.2f} s"])
+    return rows
+
+
+def _force_qp(metrics: Metrics) -> list[list[str]]:
+    assert metrics.qp is not None
+    qp = metrics.qp
+    rows = [[f"ticks {name.replace('_', ' ')}", f"{count}"] for name, count in qp.status.items()]
+    if qp.iterations is not None:
+        rows.append(["iterations, p50 / p99 / max", " / ".join(f"{value:.0f}" for value in _three(qp.iterations))])
+    rows.append(["primal residual, largest", f"{qp.primal_residual_max:.2e} N"])
+    rows.append(["dual residual, largest", f"{qp.dual_residual_max:.2e}"])
+    rows.append(["active constraints, most", f"{qp.active_max}"])
+    rows.append(["effort ‖f‖_R, mean / largest", f"{qp.effort_mean:.2f} / {qp.effort_max:.2f}"])
+    return rows
+
+
+def _three(found: Percentiles) -> tuple[float, float, float]:
+    return found.p50, found.p99, found.max
+
+
+def _percentile_row(name: str, found: Percentiles | None) -> list[str]:
+    if found is None:
+        return []
+    return [name, *(f"{value:,.1f}" for value in (found.p50, found.p99, found.p99_9, found.max))]
+
+
+def _percent(value: float | None) -> str:
+    return "no limit" if value is None else f"{100 * value:.1f} %"

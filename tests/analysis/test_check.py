@@ -1,0 +1,73 @@
+"""The verdict: limits kept, violated, not in the log; and lists of limits that are wrong."""
+
+from __future__ import annotations
+
+import pytest
+from stance.check import DIRECTORY, Limit, judge, limits_file, load_limits, parse_limits
+from stance.errors import StanceError
+from stance.log import Log
+from stance.metrics import measure
+from stance.series import Run
+from synthetic import Synthetic
+
+FIGURES = {"fell": False, "trunk": {"tilt_max_deg": 3.0}, "qp": None, "count": 2}
+
+
+def test_a_limit_is_kept_up_to_its_value() -> None:
+    limits = [Limit("tilt", "trunk.tilt_max_deg", "max", 3.0), Limit("count", "count", "min", 2)]
+    assert judge(FIGURES, limits).passed
+    assert not judge(FIGURES, [Limit("tilt", "trunk.tilt_max_deg", "max", 2.9)]).passed
+    assert not judge(FIGURES, [Limit("count", "count", "min", 3)]).passed
+    assert judge(FIGURES, [Limit("fell", "fell", "equals", False)]).passed
+
+
+def test_what_the_log_lacks_fails_unless_it_is_optional() -> None:
+    assert not judge(FIGURES, [Limit("qp", "qp.failures", "max", 0)]).passed
+    verdict = judge(FIGURES, [Limit("qp", "qp.failures", "max", 0, optional=True)])
+    assert verdict.passed
+    assert verdict.findings[0].measured == "not in the log"
+
+
+def test_a_limit_on_an_unknown_figure_is_an_error() -> None:
+    with pytest.raises(StanceError, match=r"trunk\.tilt_max"):
+        judge(FIGURES, [Limit("tilt", "trunk.tilt_max", "max", 3.0)])
+
+
+@pytest.mark.parametrize(
+    ("entry", "message"),
+    [
+        ("{name: a, metric: fell, max: 1, maximum: 2}", "unknown key maximum"),
+        ("{name: a, max: 1}", "metric is missing"),
+        ("{name: a, metric: fell}", "give one of max, min, equals"),
+        ("{name: a, metric: fell, max: 1, min: 0}", "give one of"),
+        ("{name: a, metric: fell, max: high}", "'high', but must be a number"),
+        ("just text", "no mapping"),
+    ],
+)
+def test_a_wrong_entry_is_named(entry: str, message: str) -> None:
+    with pytest.raises(StanceError, match=r"file: limits\[0\]") as caught:
+        parse_limits(f"limits: [{entry}]", "file")
+    assert message in str(caught.value)
+
+
+@pytest.mark.parametrize("text", ["", "limits: 3", "limits: []\nmore: 1", "limits: [", "- a"])
+def test_what_is_no_list_of_limits_is_an_error(text: str) -> None:
+    with pytest.raises(StanceError, match="file"):
+        parse_limits(text, "file")
+
+
+@pytest.mark.parametrize("path", sorted(DIRECTORY.glob("*.yaml")), ids=lambda path: path.stem)
+def test_every_list_that_comes_with_the_package_names_figures_that_exist(path, stand: Run) -> None:  # type: ignore[no-untyped-def]
+    assert judge(measure(stand).as_dict() | {"log": None}, load_limits(path)).findings
+
+
+def test_standing_keeps_the_limits_and_falling_does_not(stand: Run) -> None:
+    limits = load_limits(limits_file("biped", "stand"))
+    assert judge(measure(stand).as_dict(), limits).passed
+    fallen = Log.from_bytes(Synthetic(fall_at=2.0, qp_failures=(50,)).log())
+    violated = judge(measure(fallen.run(), fallen.report).as_dict(), limits).violated
+    assert {"fell", "largest trunk tilt", "failed QPs"} <= {finding.limit.name for finding in violated}
+
+
+def test_an_unknown_scenario_is_judged_by_the_default_list() -> None:
+    assert limits_file("biped", "no-such-scenario").name == "default.yaml"
