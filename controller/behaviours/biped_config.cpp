@@ -31,6 +31,8 @@ void BipedConfig::validate() const {
   require(stand.height_integral_limit >= 0.0, "stand.height_integral_limit", stand.height_integral_limit, ">= 0 m");
   require(torque_map.null_space_kp >= 0.0, "torque_map.null_space_kp", torque_map.null_space_kp, ">= 0");
   require(torque_map.null_space_kd >= 0.0, "torque_map.null_space_kd", torque_map.null_space_kd, ">= 0");
+  require(torque_map.lead >= 0.0 && torque_map.lead < 0.05, "torque_map.lead", torque_map.lead, "in 0..0.05 s");
+  require(com_offset_quiet_momentum > 0.0, "com_offset_observer.quiet_momentum", com_offset_quiet_momentum, "> 0");
   require(fall.min_upright > 0.0 && fall.min_upright < 1.0, "safety.min_upright", fall.min_upright, "in 0..1");
   require(fall.min_height > 0.0, "safety.min_height", fall.min_height, "> 0 m");
   require(damping >= 0.0, "safety.damping", damping, ">= 0");

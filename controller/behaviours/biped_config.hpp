@@ -25,6 +25,7 @@ struct StandConfig {
 struct TorqueMapConfig {
   double null_space_kp = 0.0;  ///< 1/s^2
   double null_space_kd = 0.0;  ///< 1/s
+  double lead = 0.0;           ///< s, from the state to the middle of its command's effect
 };
 
 struct FallConfig {
@@ -33,9 +34,10 @@ struct FallConfig {
 };
 
 struct BipedConfig {
-  double last_link_pitch = 0.0;  ///< rad, q1 + q2 + q3
+  double last_link_pitch = 0.0;  ///< rad, of a leg's last link against the vertical
   estimation::BaseEstimatorConfig estimator;
   estimation::CentreOfMassOffsetConfig com_offset_observer;
+  double com_offset_quiet_momentum = 0.0;  ///< kg m^2/s, about C, above which the observer waits
   force_qp::Settings force_qp;
   ForceLimits force_limits;
   StandConfig stand;

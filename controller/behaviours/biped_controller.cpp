@@ -34,10 +34,13 @@ Nominal nominal_posture(const rigid_body::Model& model, const std::array<rigid_b
     nominal.r[i] = p_WF - Vector3(0.0, 0.0, feet[i].radius) - centroidal.p_WC;
   }
   nominal.height = -0.5 * (nominal.r[0].z() + nominal.r[1].z());
-  // The feet held, each leg's redundant joint following its last link's constant pitch: the three pitch rates add up to none.
+  // The feet held, and each leg's last link keeping its pitch in W: its three pitch rates take the trunk's back.
   rigid_body::ConstraintRows constant_pitch(2, 6 + model.num_joints);
   constant_pitch.setZero();
-  for (int leg = 0; leg < 2; ++leg) constant_pitch.block<1, 3>(leg, 6 + 4 * leg + 1).setOnes();
+  for (int leg = 0; leg < 2; ++leg) {
+    constant_pitch(leg, 1) = 1.0;
+    constant_pitch.block<1, 3>(leg, 6 + 4 * leg + 1).setOnes();
+  }
   const Matrix3 inertia = rigid_body::effective_inertia(model, state, kinematics, feet, constant_pitch);
   nominal.inertia = inertia.diagonal().asDiagonal();
   return nominal;
@@ -168,7 +171,9 @@ void BipedController::plan(int periods, Trace& trace) noexcept {
   seen.L_C_W = where.L_C_W;
   seen.p_WF = {base.p_WF[0], base.p_WF[1]};
   seen.yaw = memory_.yaw;
-  seen.standing = base.contact[0] && base.contact[1];
+  // A push turns the robot about its feet as an offset would: look only while the robot is quiet.
+  seen.standing = base.contact[0] && base.contact[1] &&
+                  body_.centroidal.L_C_W.head<2>().norm() < config_.com_offset_quiet_momentum;
   where.p_WC = seen.p_WC + observer_.step(seen, kControlPeriod * periods);
   where.height_offset = memory_.user_command.height_offset;
   where.periods = periods;

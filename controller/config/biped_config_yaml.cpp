@@ -33,10 +33,11 @@ estimation::BaseEstimatorConfig estimator(StrictYaml yaml) {
   return c;
 }
 
-estimation::CentreOfMassOffsetConfig com_offset_observer(StrictYaml yaml) {
+estimation::CentreOfMassOffsetConfig com_offset_observer(StrictYaml yaml, double& quiet_momentum) {
   estimation::CentreOfMassOffsetConfig c;
   c.bandwidth = yaml.number("bandwidth");
   c.limit = yaml.number("limit");
+  quiet_momentum = yaml.number("quiet_momentum");
   yaml.finish();
   return c;
 }
@@ -75,6 +76,7 @@ behaviours::TorqueMapConfig torque_map(StrictYaml yaml) {
   behaviours::TorqueMapConfig c;
   c.null_space_kp = yaml.number("null_space_kp");
   c.null_space_kd = yaml.number("null_space_kd");
+  c.lead = yaml.number("lead");
   yaml.finish();
   return c;
 }
@@ -100,7 +102,7 @@ behaviours::BipedConfig biped_config_from_yaml(const std::string& yaml_text) {
   behaviours::BipedConfig c;
   c.last_link_pitch = yaml.number("last_link_pitch");
   c.estimator = estimator(yaml.mapping("estimator"));
-  c.com_offset_observer = com_offset_observer(yaml.mapping("com_offset_observer"));
+  c.com_offset_observer = com_offset_observer(yaml.mapping("com_offset_observer"), c.com_offset_quiet_momentum);
   force_qp(yaml.mapping("force_qp"), c.force_qp, c.force_limits);
   c.stand = stand(yaml.mapping("stand"));
   c.torque_map = torque_map(yaml.mapping("torque_map"));
