@@ -170,8 +170,8 @@ def push_text(push: metrics.Push) -> str:
 
 def _unsafe(run: Run) -> list[tuple[float, float]]:
     changes = metrics.safety(run)
-    ends = [change.at for change in changes[1:]] + [run.span[1]]
-    return [(change.at, end) for change, end in zip(changes, ends, strict=True) if change.mode != "run"]
+    ends = [*(change.at for change in changes[1:]), run.span[1]]
+    return [(change.at, end) for change, end in zip(changes, ends, strict=False) if change.mode != "run"]
 
 
 def time_axis(axes: Sequence[Axes], run: Run) -> None:

@@ -55,7 +55,7 @@ def test_an_empty_file_has_no_events() -> None:
     assert len(index_events(b"")) == 0
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=100, deadline=None)
 @given(event_lists)
 def test_finds_every_event_of_a_whole_log_even_where_payloads_hold_sync_words(written: Written) -> None:
     data = encode_log(written)
@@ -63,7 +63,7 @@ def test_finds_every_event_of_a_whole_log_even_where_payloads_hold_sync_words(wr
     assert index_events(data).skipped == []
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(event_lists, st.data())
 def test_a_torn_tail_costs_only_the_torn_event(written: Written, data: st.DataObject) -> None:
     whole = encode_log(written)
@@ -78,7 +78,7 @@ def test_a_torn_tail_costs_only_the_torn_event(written: Written, data: st.DataOb
         assert sum(part.length for part in index.skipped) == cut - (int(ends[complete - 1]) if complete else 0)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(event_lists, st.data())
 def test_bytes_lost_in_the_middle_cost_only_the_events_they_touch(written: Written, data: st.DataObject) -> None:
     whole = encode_log(written)
@@ -100,7 +100,7 @@ def test_bytes_lost_in_the_middle_cost_only_the_events_they_touch(written: Writt
     assert len(found) <= len(untouched) + 1  # two torn halves may join to something that reads as an event
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(event_lists, st.data())
 def test_overwritten_bytes_never_raise_and_every_byte_is_accounted_for(written: Written, data: st.DataObject) -> None:
     damaged = bytearray(encode_log(written))
@@ -112,7 +112,7 @@ def test_overwritten_bytes_never_raise_and_every_byte_is_accounted_for(written: 
     assert read + sum(part.length for part in index.skipped) == len(damaged)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=120, deadline=None)
 @given(st.binary(max_size=300))
 def test_any_bytes_at_all_never_raise(data: bytes) -> None:
     index_events(data)

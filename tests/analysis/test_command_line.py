@@ -1,0 +1,275 @@
+"""Every command on a small log: what it prints, what it writes, and how it ends."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import fake_programs
+import pandas as pd
+import pytest
+from scipy.io import loadmat
+from stance import network, plots
+from stance.cli import main
+from stance.log import Log
+from synthetic import Synthetic
+
+
+@pytest.fixture(scope="module")
+def small(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return str(
+        Synthetic(duration=0.6, pushes=[(0.2, 0.1, (5.0, 0.0, 0.0))]).write(tmp_path_factory.mktemp("l") / "a.log")
+    )
+
+
+@pytest.fixture(scope="module")
+def fallen(tmp_path_factory: pytest.TempPathFactory) -> str:
+    return str(Synthetic(duration=1.0, fall_at=0.2).write(tmp_path_factory.mktemp("l") / "b.log"))
+
+
+def test_info_tells_channels_and_runs(small: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", small]) == 0
+    text = capsys.readouterr().out
+    assert "CONTROLLER_TRACE" in text and "nothing was skipped" in text and "stance-sim 0.1.0" in text
+    assert main(["info", small, "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["schema"], found["complete"], found["runs"][0]["states"]) == ("stance.info", True, 61)
+
+
+def test_info_tells_what_was_skipped(small: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    torn = tmp_path / "torn.log"
+    torn.write_bytes(Path(small).read_bytes()[:-40])
+    assert main(["info", str(torn)]) == 0
+    assert "torn tail" in capsys.readouterr().out
+
+
+def test_info_starts_without_pandas_and_matplotlib(small: str) -> None:
+    code = (
+        "import sys; from stance.cli import main; main(['info', sys.argv[1], '--silent']); "
+        "print([m for m in ('pandas', 'matplotlib', 'scipy', 'jinja2', 'lcm') if m in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code, small], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+
+
+def test_check_passes_and_fails_by_exit_code(small: str, fallen: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", small]) == 0
+    assert "PASS" in capsys.readouterr().out
+    assert main(["check", fallen, "--json"]) == 1
+    assert json.loads(capsys.readouterr().out)["passed"] is False
+
+
+def test_check_takes_other_limits(small: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    limits = tmp_path / "strict.yaml"
+    limits.write_text("limits: [{name: no tilt at all, metric: trunk.tilt_max_deg, max: 0.0}]")
+    assert main(["check", small, "--limits", str(limits)]) == 1
+    assert "no tilt at all" in capsys.readouterr().out
+    assert main(["check", small, "--limits", str(tmp_path / "absent.yaml")]) == 2
+
+
+def test_report_writes_its_files(
+    small: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(plots, "PLOTS", {"gait": plots.gait})  # one is enough here
+    assert main(["report", small, "--out", str(tmp_path), "--json"]) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert all(Path(result[name]).exists() for name in ("report", "summary", "plots"))
+
+
+def test_plot_draws_what_is_asked_for(small: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["plot", small, "--list"]) == 0
+    assert "timing" in capsys.readouterr().out
+    out = ["--out", str(tmp_path)]
+    assert main(["plot", small, *out, "--only", "gait", "--from", "0.1", "--to", "0.4", "--format", "svg"]) == 0
+    assert (tmp_path / "gait.svg").read_bytes().startswith(b"<?xml")
+    assert main(["plot", small, *out, "--picture"]) == 0
+    assert (tmp_path / "picture.png").exists()
+    assert main(["plot", small, *out, "--picture", "--at", "0.1", "0.3", "--view", "front", "--silent"]) == 0
+    assert main(["plot", small, *out, "--only", "nonsense"]) == 2
+
+
+@pytest.mark.parametrize("kind", ["parquet", "csv"])
+def test_export_writes_every_channel(small: str, tmp_path: Path, kind: str) -> None:
+    assert main(["export", kind, small, "--out", str(tmp_path)]) == 0
+    path = tmp_path / f"TRUTH.{kind}"
+    frame = pd.read_parquet(path) if kind == "parquet" else pd.read_csv(path)
+    expected = Log.open(small).run().frame("TRUTH")
+    assert list(frame.columns) == list(expected.columns)
+    assert frame["p_WC_2"].to_numpy() == pytest.approx(expected["p_WC_2"].to_numpy())
+
+
+def test_export_for_matlab_keeps_shapes(small: str, tmp_path: Path) -> None:
+    assert main(["export", "mat", small, "--out", str(tmp_path / "run.mat")]) == 0
+    truth = loadmat(tmp_path / "run.mat", simplify_cells=True)["TRUTH"]
+    assert truth["f_F_W"].shape == (61, 4, 3)
+    assert truth["t"][-1] == pytest.approx(0.6)
+
+
+def test_verify_passes_the_exit_code_on(
+    small: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    program = tmp_path / "stance-replay"
+    program.write_text("#!/bin/sh\necho 60 equal, 1 different\nexit 1\n")
+    program.chmod(0o755)
+    monkeypatch.setenv("STANCE_BIN_DIR", str(tmp_path))
+    assert main(["replay", small, "--verify", "--json"]) == 1
+    assert json.loads(capsys.readouterr().out) == {"equal": False, "exit_code": 1, "text": "60 equal, 1 different"}
+    monkeypatch.setenv("STANCE_BIN_DIR", str(tmp_path / "absent"))
+    assert main(["replay", small, "--verify"]) == 2
+    assert "stance-replay is not in $STANCE_BIN_DIR" in capsys.readouterr().err
+
+
+def test_doctor_has_a_line_for_each_thing(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["doctor", "--json"]) in (0, 2)
+    found = {one["name"]: one for one in json.loads(capsys.readouterr().out)}
+    assert {"stance-sim", "lcm-logger", "network", "real-time priority", "locked memory"} <= set(found)
+    assert all("\n" not in one["text"] for one in found.values())
+
+
+@pytest.mark.parametrize("command", ["info", "check", "report", "plot", "replay"])
+def test_unreadable_input_is_exit_3_and_one_line(
+    command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    junk = tmp_path / "junk"
+    junk.write_bytes(b"not a log" * 100)
+    for path in (junk, tmp_path / "absent"):
+        assert main([command, str(path)]) == 3
+        assert capsys.readouterr().err.count("\n") == 1
+
+
+@pytest.mark.parametrize(
+    "arguments", [[], ["fly"], ["info"], ["run", "--duration", "-1"], ["replay", "x", "--speed", "-1"]]
+)
+def test_usage_errors_are_exit_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as caught:
+        main(arguments)
+    assert caught.value.code == 2
+
+
+def test_silent_says_nothing(small: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", small, "--silent"]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+# ---- over LCM, with stand-ins for the C++ programs -------------------------------------------------------------------
+
+needs_network = pytest.mark.skipif(
+    not network.host_is_loopback() and network.namespace_command() is None,
+    reason="no loopback multicast and no network namespaces on this machine",
+)
+
+
+class Stance:
+    """The command as a process of its own, with stand-ins for the simulator and the controller."""
+
+    def __init__(self, directory: Path) -> None:
+        programs = directory / "bin"
+        programs.mkdir()
+        fake_programs.install(programs)
+        self.out = directory / "run"
+        self.environment = {
+            **os.environ,
+            "STANCE_BIN_DIR": str(programs),
+            network.RUNTIME_DIRECTORY: str(directory / "runtime"),
+        }
+
+    def start(self, *arguments: str, **environment: str) -> subprocess.Popen[str]:
+        return subprocess.Popen(
+            [sys.executable, "-m", "stance", *arguments],
+            env={**self.environment, **environment},
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+
+    def run(self, *arguments: str, **environment: str) -> tuple[int, str, str]:
+        process = self.start(*arguments, **environment)
+        out, err = process.communicate(timeout=60)
+        return process.returncode, out, err
+
+
+@pytest.fixture
+def stance(tmp_path: Path) -> Stance:
+    return Stance(tmp_path)
+
+
+@needs_network
+def test_run_records_a_log_and_writes_its_report(stance: Stance) -> None:
+    code, out, err = stance.run("run", "--lockstep", "--duration", "0.8", "--out", str(stance.out), "--json")
+    assert code == 0, err
+    result = json.loads(out)
+    assert result["verdict"]["passed"]
+    assert all(Path(result[name]).exists() for name in ("log", "report", "summary", "plots"))
+    report = Log.open(result["log"]).report
+    assert report.problems() == []
+    assert {channel.name for channel in report.channels} >= {"ROBOT_STATE", "TRUTH", "RUN_INFO_CONTROLLER"}
+
+
+@needs_network
+def test_a_fall_is_recorded_and_is_exit_1(stance: Stance) -> None:
+    code, out, _ = stance.run("run", "--duration", "1", "--out", str(stance.out), "--no-report", FAKE_SIM="fall")
+    assert (code, "FELL" in out) == (1, True)
+    assert Log.open(stance.out / "run.lcmlog").run().field("TRUTH", "fallen").any()
+
+
+@needs_network
+@pytest.mark.parametrize(
+    ("environment", "message"),
+    [
+        ({"FAKE_SIM": "fail"}, "stance-sim failed (exit 2): stance-sim: no scenario of that name"),
+        ({"FAKE_CONTROLLER": "fail"}, "stance-controller failed at its start (exit 2): stance-controller: biped.yaml"),
+        (
+            {"FAKE_CONTROLLER": "die"},
+            "stance-controller ended during the run (exit 3): stance-controller: out of memory",
+        ),
+    ],
+)
+def test_a_failing_program_is_one_line_with_its_own_words(
+    stance: Stance, environment: dict[str, str], message: str
+) -> None:
+    code, _, err = stance.run("run", "--duration", "20", "--out", str(stance.out), **environment)
+    assert code == 2
+    assert message in err
+    assert err.count("\n") == 1
+
+
+@needs_network
+def test_ctrl_c_ends_every_process_and_leaves_a_readable_log_and_others_can_join(stance: Stance) -> None:
+    process = stance.start("run", "--out", str(stance.out), FAKE_SIM="forever")
+    log = stance.out / "run.lcmlog"
+    deadline = time.monotonic() + 30
+    while not (log.exists() and log.stat().st_size > 100_000) and time.monotonic() < deadline:
+        time.sleep(0.05)
+    code, out, _ = stance.run("shell", "--", "sh", "-c", "echo url $LCM_DEFAULT_URL; readlink /proc/self/ns/net")
+    assert code == 0
+    assert "url udpm://239.255.76.67:7667?ttl=0" in out
+    assert os.readlink(f"/proc/{process.pid}/ns/net") in out
+    children = subprocess.run(
+        ["pgrep", "-P", str(process.pid)], capture_output=True, text=True, check=False
+    ).stdout.split()
+    assert len(children) == 3
+    process.send_signal(signal.SIGINT)
+    _, err = process.communicate(timeout=30)
+    assert process.returncode == 130
+    assert "interrupted after" in err
+    assert not any(Path(f"/proc/{child}").exists() for child in children)
+    assert Log.open(log).report.skipped == []
+    assert stance.run("shell", "--", "true")[0] == 2
+
+
+@needs_network
+def test_replay_publishes_over_lcm_in_its_own_network(stance: Stance, small: str) -> None:
+    code, out, err = stance.run("replay", small, "--speed", "0", "--channels", "TRUTH", "ROBOT_*", "--json")
+    assert code == 0, err
+    assert json.loads(out)["channels"] == {"ROBOT_STATE": 61, "TRUTH": 61}
+
+
+def test_run_without_its_programs_says_what_to_do(stance: Stance, tmp_path: Path) -> None:
+    code, _, err = stance.run("run", "--out", str(stance.out), STANCE_BIN_DIR=str(tmp_path / "absent"))
+    assert code == 2
+    assert "build the project" in err

@@ -1,0 +1,166 @@
+"""Every plot draws on every kind of log, and the report is one file that needs nothing else."""
+
+from __future__ import annotations
+
+import json
+import re
+import warnings
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+from stance import plots, style
+from stance.errors import StanceError, UnreadableError
+from stance.log import Log
+from stance.metrics import measure
+from stance.picture import picture, pose_at
+from stance.report import MAX_EVENTS, analyse, figures, render, write, write_plots
+from stance.series import Run
+from stance.timeline import timeline
+from synthetic import PERIOD, WALL, Synthetic, encode_log, records, run_of, ticked
+
+
+def lonely() -> Run:
+    """States and nothing else."""
+    state = ticked("robot_state_t", 30)
+    state["num_joints"], state["num_contacts"], state["sample_period"] = 8, 2, PERIOD / 2
+    return run_of({"ROBOT_STATE": state})
+
+
+def without_truth() -> Run:
+    return run_of({name: values for name, values in Synthetic(duration=0.5).messages().items() if name != "TRUTH"})
+
+
+RENDERED = ("stand", "fall", "one state")  # the others are drawn up to their layout: it is what takes the time
+KINDS = {
+    "stand": lambda: Log.from_bytes(Synthetic(duration=3.0).log()).run(),
+    "fall": lambda: Log.from_bytes(Synthetic(duration=3.0, fall_at=1.0, qp_failures=(5, 6), refused=3).log()).run(),
+    "late": lambda: Log.from_bytes(Synthetic(duration=1.0, late_ticks={30: 25_000.0}).log()).run(),
+    "lockstep": lambda: Log.from_bytes(Synthetic(duration=1.0, realtime=False).log()).run(),
+    "states alone": lonely,
+    "no truth": without_truth,
+    "one state": lambda: run_of({"ROBOT_STATE": ticked("robot_state_t", 1)}),
+    "a part": lambda: Log.from_bytes(Synthetic(duration=3.0).log()).run().between(1.4, 1.9),
+}
+
+
+@pytest.fixture(scope="module", params=list(KINDS))
+def any_run(request: pytest.FixtureRequest) -> tuple[str, Run]:
+    return request.param, KINDS[request.param]()
+
+
+@pytest.mark.parametrize("name", ["summary_card", *plots.PLOTS])
+def test_every_plot_draws_without_a_warning(name: str, any_run: tuple[str, Run]) -> None:
+    kind, run = any_run
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        figure = plots.summary_card(run, measure(run)) if name == "summary_card" else plots.PLOTS[name](run)
+        assert isinstance(figure, Figure)
+        if kind in RENDERED:
+            assert style.render(figure, dpi=30).startswith(b"\x89PNG")
+
+
+def test_the_same_run_gives_the_same_picture_byte_for_byte(stand: Run) -> None:
+    for kind in ("png", "svg"):
+        assert style.render(plots.gait(stand), kind, 40) == style.render(plots.gait(stand), kind, 40)
+
+
+def test_plots_leave_matplotlibs_settings_alone(stand: Run) -> None:
+    import matplotlib
+
+    before = dict(matplotlib.rcParams)
+    style.render(plots.gait(stand), dpi=30)
+    assert dict(matplotlib.rcParams) == before
+
+
+def test_the_picture_draws_pushes_chosen_instants_and_views(stand: Run) -> None:
+    assert len(picture(stand).axes) == 10  # two pushes, five instants each
+    assert len(picture(stand, [0.5, 1.0, 2.0], "front").axes) == 3
+
+
+def test_a_pose_is_the_logged_instant(stand: Run) -> None:
+    pose = pose_at(stand, 1.5049)
+    assert pose.time == pytest.approx(1.5)
+    assert np.array_equal(pose.T_WB[:3, 3], stand.field("TRUTH", "p_WB")[150])
+    assert pose.f_F_W.shape == (2, 3)
+
+
+def test_a_robot_that_is_not_in_the_log_cannot_be_drawn() -> None:
+    with pytest.raises(UnreadableError, match="no TRUTH"):
+        picture(without_truth())
+
+
+@pytest.fixture(scope="module")
+def written(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("report")
+    path = Synthetic(duration=3.0, fall_at=2.0, late_ticks={30: 25_000.0}).write(directory / "run.lcmlog")
+    write(analyse(Log.open(path)), directory)
+    return directory
+
+
+def test_the_report_is_one_file_without_anything_from_outside(written: Path) -> None:
+    html = (written / "report.html").read_text()
+    sources = re.findall(r'(?:src|href)="([^"]*)"', html)
+    assert all(source.startswith(("data:image/png;base64,", "#")) for source in sources)
+    assert "http" not in re.sub(r"base64,[A-Za-z0-9+/=]+", "", html).replace("http-equiv", "")
+    assert html.count("<figure>") == 7
+    assert "FAIL" in html and "fell after" in html and "woke 25.0 ms late" in html
+
+
+def test_the_summary_is_versioned_and_holds_figures_verdict_and_events(written: Path) -> None:
+    summary = json.loads((written / "summary.json").read_text())
+    assert (summary["schema"], summary["version"]) == ("stance.summary", 1)
+    assert summary["metrics"]["fell"] is True
+    assert summary["verdict"]["passed"] is False
+    assert summary["programs"]["simulator"]["seed"] == 1
+    assert "urdf" not in summary["programs"]["controller"]
+    times = [event["at"] for event in summary["events"]]
+    assert times == sorted(times)
+    assert {"push", "fall", "fault", "safety", "missed", "run", "command"} <= {e["kind"] for e in summary["events"]}
+
+
+def test_every_plot_lies_beside_the_report(written: Path) -> None:
+    assert {path.stem for path in (written / "plots").iterdir()} == {"summary_card", "picture", *plots.PLOTS}
+
+
+def test_what_a_log_says_is_escaped(stand: Run) -> None:
+    analysis = analyse(Log.from_bytes(Synthetic(duration=0.2).log()))
+    assert analysis.run.simulator is not None
+    object.__setattr__(analysis.run.simulator, "options", "<script>alert(1)</script>")
+    html = render(analysis, {})
+    assert "<script>" not in html
+    assert "&lt;script&gt;" in html
+
+
+def test_a_flood_of_events_does_not_swell_the_report() -> None:
+    synthetic = Synthetic(duration=1.0)
+    analysis = analyse(Log.from_bytes(synthetic.log()))
+    flooded = analysis.events * (MAX_EVENTS // len(analysis.events) + 2)
+    object.__setattr__(analysis, "events", flooded)
+    assert f"and {len(flooded) - MAX_EVENTS} more, in summary.json" in render(analysis, {})
+
+
+def test_an_unknown_plot_is_an_error_that_names_the_known(stand: Run, tmp_path: Path) -> None:
+    analysis = analyse(Log.from_bytes(Synthetic(duration=0.2).log()))
+    with pytest.raises(StanceError, match="force_qp"):
+        write_plots(analysis, tmp_path, ["forses"])
+    assert "picture" in figures(analysis)
+
+
+def test_the_timeline_tells_gaps_restarts_stops_and_commands_that_change() -> None:
+    events = Synthetic(duration=2.0, pushes=[]).events()
+    states = [i for i, event in enumerate(events) if event[1] == "ROBOT_STATE"]
+    kept = [event for i, event in enumerate(events) if i not in (states[50], states[51])]
+    stop = records("stop_t", 1)
+    command = records("user_command_t", 2)
+    command["behaviour"], command["velocity"] = 1, [0.5, 0.0]
+    kept += [(WALL + 1_200_000, "STOP", stop[0].tobytes())]
+    kept += [(WALL + 1_000_000 + i, "USER_COMMAND", command[i].tobytes()) for i in range(2)]
+    found = timeline(Log.from_bytes(encode_log(sorted(kept))).run())
+    texts = [(round(event.at, 2), event.kind, event.text) for event in found]
+    assert (0.49, "gap", "ROBOT_STATE: 2 messages missing") in texts
+    assert (1.2, "stop", "the operator's stop") in texts
+    commands = [text for _, kind, text in texts if kind == "command"]
+    assert len(commands) == 2  # stand, walk; the repetition is not told
+    assert commands[1].startswith("walk, velocity (+0.50, +0.00) m/s")
