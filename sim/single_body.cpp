@@ -1,38 +1,47 @@
 #include "sim/single_body.hpp"
 
 #include <Eigen/LU>
+#include <cmath>
 
 namespace stance::sim {
 namespace {
 
-/// The whole robot as one body: B's frame stays where it is, the centre of mass and the inertia are the composite ones.
+constexpr int kMaxIterations = 50;
+constexpr double kTolerance = 1e-13;  // m, m/s
+
+/// The whole robot as one body: frame at the centre of mass, axes of B.
 WorldSetup as_one_body(const WorldSetup& setup) {
-  rigid_body::State pose;  // B at W's origin
-  pose.q = setup.initial.q;
+  rigid_body::State pose = setup.initial;
+  pose.R_WB.setIdentity();
   rigid_body::Kinematics kinematics;
   rigid_body::forward_kinematics(setup.model, pose, kinematics);
   rigid_body::Centroidal whole;
   rigid_body::centroidal(setup.model, kinematics, whole);
+  const Vector3 p_BC = whole.p_WC - pose.p_WB;
 
   WorldSetup one;
   one.model.name = setup.model.name;
   one.model.total_mass = whole.mass;
-  one.model.bodies[0] = {setup.model.name, whole.mass, whole.p_WC, whole.inertia_W};
+  one.model.bodies[0] = {setup.model.name, whole.mass, Vector3::Zero(), whole.inertia_W};
   one.floating = true;
-  one.initial = setup.initial;
-  one.initial.q.setZero();
-  one.initial.qd.setZero();
+  one.initial.R_WB = setup.initial.R_WB;
+  one.initial.p_WB = setup.initial.p_WB + setup.initial.R_WB * p_BC;
+  one.initial.w_WB_W = setup.initial.w_WB_W;
+  one.initial.v_WB = setup.initial.v_WB + setup.initial.w_WB_W.cross(setup.initial.R_WB * p_BC);
   return one;
 }
 
 }  // namespace
 
 SingleBody::SingleBody(const WorldSetup& setup)
-    : legs_(kinematics::leg_geometries(setup.model, setup.feet)),
+    : model_(setup.model),
+      legs_(kinematics::leg_geometries(setup.model, setup.feet)),
       p_WF_(foot_tips(setup.model, setup.feet, setup.initial)),
-      body_(as_one_body(setup)) {
+      body_(as_one_body(setup)),
+      state_(setup.initial) {
+  const double pitch = math::rpy_from_rotation(setup.initial.R_WB).y();
   for (std::size_t leg = 0; leg < legs_.size(); ++leg) {
-    last_link_pitch_[leg] = setup.initial.q.segment<3>(static_cast<Eigen::Index>(4 * leg + 1)).sum();
+    last_link_pitch_[leg] = setup.initial.q.segment<3>(static_cast<Eigen::Index>(4 * leg + 1)).sum() + pitch;
   }
   foot_force_W_.fill(Vector3::Zero());
   follow();
@@ -50,28 +59,60 @@ void SingleBody::step(const AppliedForces& forces, const Wrench& push) {
 }
 
 void SingleBody::follow() noexcept {
-  const rigid_body::State& base = body_.state();
-  state_.p_WB = base.p_WB;
-  state_.R_WB = base.R_WB;
-  state_.v_WB = base.v_WB;
-  state_.w_WB_W = base.w_WB_W;
+  const rigid_body::State& body = body_.state();  // its origin is C
+  rigid_body::Kinematics kinematics;
+  rigid_body::Centroidal whole;
+  const auto update = [&] {
+    rigid_body::forward_kinematics(model_, state_, kinematics);
+    rigid_body::centroidal(model_, kinematics, whole);
+  };
+  // The legs weigh a quarter of the robot, so C moves nearly as the trunk does: each correction leaves a small part of
+  // the error.
+  state_.R_WB = body.R_WB;
+  for (int i = 0; i < kMaxIterations; ++i) {
+    place_legs();
+    update();
+    const Vector3 error = body.p_WB - whole.p_WC;
+    state_.p_WB += error;
+    if (error.norm() < kTolerance) break;
+  }
+  state_.w_WB_W = body.w_WB_W;
+  for (int i = 0; i < kMaxIterations; ++i) {
+    move_legs();
+    update();
+    const Vector3 error = body.v_WB - whole.v_WC;
+    state_.v_WB += error;
+    if (error.norm() < kTolerance) break;
+  }
+}
+
+void SingleBody::place_legs() noexcept {
   const Matrix3 R_LB = kinematics::leg_rotation().transpose();
+  const double pitch = math::rpy_from_rotation(state_.R_WB).y();
   for (std::size_t leg = 0; leg < legs_.size(); ++leg) {
-    const Vector3 p_BF = base.R_WB.transpose() * (p_WF_[leg] - base.p_WB);
+    const Vector3 p_BF = state_.R_WB.transpose() * (p_WF_[leg] - state_.p_WB);
     kinematics::LegVector q;
     // Out of reach, the joints are the nearest: the robot has fallen by then.
-    static_cast<void>(kinematics::leg_ik(legs_[leg], R_LB * (p_BF - legs_[leg].p_BL), last_link_pitch_[leg], q));
+    static_cast<void>(
+        kinematics::leg_ik(legs_[leg], R_LB * (p_BF - legs_[leg].p_BL), last_link_pitch_[leg] - pitch, q));
+    state_.q.segment<4>(static_cast<Eigen::Index>(4 * leg)) = q;
+  }
+}
 
-    // The foot's velocity in W is zero, and the last link keeps its angle in the leg.
-    Vector3 p_BF_reached;
+void SingleBody::move_legs() noexcept {
+  const Vector3 w_B = state_.R_WB.transpose() * state_.w_WB_W;
+  for (std::size_t leg = 0; leg < legs_.size(); ++leg) {
+    const auto first = static_cast<Eigen::Index>(4 * leg);
+    const kinematics::LegVector q = state_.q.segment<4>(first);
+    Vector3 p_BF;
     Eigen::Matrix<double, 3, 4> J_BF;
-    kinematics::foot_in_base(legs_[leg], q, p_BF_reached, J_BF);
+    kinematics::foot_in_base(legs_[leg], q, p_BF, J_BF);
+    // The foot stands still in W, and the last link turns about its pitch axis as little as W does.
+    const Vector3 pitch_axis_B(0.0, std::cos(q[0]), std::sin(q[0]));
     Eigen::Matrix4d constraints;
     constraints << J_BF, 0.0, 1.0, 1.0, 1.0;
     Eigen::Vector4d rates;
-    rates << -base.R_WB.transpose() * (base.v_WB + base.w_WB_W.cross(base.R_WB * p_BF)), 0.0;
-    const auto first = static_cast<Eigen::Index>(4 * leg);
-    state_.q.segment<4>(first) = q;
+    rates << -(state_.R_WB.transpose() * state_.v_WB + w_B.cross(p_BF)), -pitch_axis_B.dot(w_B);
     state_.qd.segment<4>(first) = constraints.fullPivLu().solve(rates);
   }
 }

@@ -1,10 +1,10 @@
 #pragma once
-// The controller's own model as a plant: one rigid body in Bullet with the robot's total mass and its composite inertia
-// about C in the nominal pose, joints locked. Gravity, the pushes, and the planned forces at the planned points act on
-// it.
+// The controller's own model as a plant: one rigid body in Bullet at the robot's centre of mass, with its total mass.
+// Gravity, the pushes, and the planned forces at the planned points act on it.
 //
-// The feet stay on the ground where they start. The joints, which weigh nothing here, follow: a closed-form inverse of
-// the legs puts the feet there, the last link's angle in the leg kept.
+// What the sensors see is the robot whose centre of mass is there and whose trunk is turned so: its feet stay where
+// they start, each leg's last link keeps its pitch in W, and the trunk stands where the legs' weight asks it to, at the
+// speed that gives C its own.
 #include <array>
 #include <vector>
 
@@ -36,9 +36,12 @@ class SingleBody {
 
  private:
   void follow() noexcept;
+  void place_legs() noexcept;
+  void move_legs() noexcept;
 
+  rigid_body::Model model_;
   std::array<kinematics::LegGeometry, 2> legs_;
-  std::array<double, 2> last_link_pitch_{};  // rad, q1 + q2 + q3
+  std::array<double, 2> last_link_pitch_{};  // rad, q1 + q2 + q3 with the trunk upright
   ContactVectors p_WF_{};
   World body_;
   rigid_body::State state_;

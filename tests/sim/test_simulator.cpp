@@ -459,6 +459,8 @@ TEST_CASE("TheSingleBodysJointsKeepTheFeetWhereTheyAre") {
       const double rate = (truth.joint_position[i] - last.joint_position[i]) / kControlPeriod;
       CHECK(std::abs(0.5 * (truth.joint_velocity[i] + last.joint_velocity[i]) - rate) < 0.05);
     }
+    // The robot of these joints has its centre of mass where the single body is.
+    CHECK((mechanics(run.robot.model, state).p_WC - vector(truth.p_WC)).norm() < 1e-9);
     last = truth;
   }
 }
