@@ -5,20 +5,22 @@
 // accelerometer bias b_a (in B). Error, 21 = 7 x 3, in this order, theta to d_i in W:
 //   R_true = exp([theta]x) R        v_true = exp([theta]x) v + dv        p_true = p + dp
 //   d_true = exp([theta]x) d + dd_left, dd_right        b_true = b + db_g, db_a
-// v and d turn with theta (the right-invariant error of Hartley et al., IJRR 2020): no Jacobian below holds a direction
-// of measured or estimated motion, so that noise cannot make the yaw and the accelerometer's bias look observed. With
-// the additive error it does: the filter is sure of a yaw that drifts with the gyro's bias.
+// v and d turn with theta (the right-invariant error of Hartley et al., IJRR 2020): no derivative by theta below holds
+// an estimated motion, so that noise cannot make the yaw and the accelerometer's bias look observed. With the additive
+// error it does: the filter is sure of a yaw that drifts with the gyro's bias.
 //
 // A sample of `dt` seconds brings means (gyro, accelerometer, joint velocity) and, at its end, joint positions. A mean
 // stands for the sample's middle, so that the filter does not lag: with w = gyro - b_g, s = accelerometer - b_a, R_mid
 // at the middle
-//   predict    a = R_mid s + g     R = R exp([w dt]x)     p += v dt + a dt^2/2     v += a dt     d -= v_mid dt (the
-//   foot stays) F          turn = dt R_mid db_g                          theta_mid = theta - turn/2
+//   predict    a = R_mid s + g     R = R exp([w dt]x)     p += v dt + a dt^2/2     v += a dt
+//              d -= v_mid dt (the foot stays)
+//   F          turn = dt R_mid db_g                       theta_mid = theta - turn/2
 //              change = dt [g]x theta_mid - [v_mid]x turn - dt R_mid db_a
-//              dp += dt (dv + change/2) - dt [v_mid]x theta_mid
+//              dp += dt (dv + change/2) - dt [v_mid]x theta_mid      (p does not turn: it is in no measurement)
 //              dd -= dt (dv + change/2) + [d_mid]x turn        dv += change        theta -= turn
 //   rolling    the tip is the centre of a sphere of radius r: u = w_link x (0, 0, r); a stance foot moves by u dt.
 //              F leaves out how u varies with the tilt: r dt |w| = 1e-4 m/rad
+//   noise      of the gyro turns v and d too: left out beside their own, 2e-4 |d| next to 3e-3 m/sqrt(s)
 //   velocity   the point of the sphere on the ground rests: z = u - a_v - v_mid = 0,  v_mid = v - a dt/2,
 //              a_v = R_mid (J qd + w x c),  w_link = R_mid (w + w_BF)
 //              H: theta_mid: -[w_link]x [r]x - dt/2 [g]x    dv: I    db_g: R_mid [c]x - [r]x R_mid + dt/2 [v]x R_mid

@@ -3,18 +3,18 @@
 //   contact     = contact switch and planned stance
 //   trust alpha = min(1, time in contact / contact_ramp, load)
 //   1. predict  state and P; a foot in contact rolls: d += u dt
-//   2. gate     before any update: a foot in contact slips where its velocity's NIS > slip_gate (or is no number); its
-//   time in
-//               contact starts again
+//   2. gate     before any update: a foot in contact slips where its velocity's NIS > slip_gate (or is no number);
+//               its time in contact starts again
 //   3. feet     not in contact or slipping: d = R c anew, its error uncorrelated, of variance swing_foot_noise^2 dt;
 //               others: variance plus (stance_foot_noise + unloading_foot_noise (1 - alpha))^2 dt
 //   4. update   each foot in contact: velocity, position; variances times 1 + ramp_gain (1 - alpha). A slipping foot's
-//   velocity
-//               is skipped, but once refused for slip_timeout it is taken, its variance times slip_inflation: if it is
-//               the filter that is wrong, that brings it back.
+//               velocity is skipped, but once refused for slip_timeout it is taken, its variance times slip_inflation.
 //
-// Gating the velocity alone would not do: a slipping foot's position drags velocity and tilt with it, hence step 3 for
-// it too.
+// Gating the velocity alone would not do: a slipping foot's position drags velocity and tilt too, hence step 3 for it.
+//
+// Where both feet were refused for slip_timeout and agree with each other, it is the filter that is wrong (a blow that
+// the accelerometer did not see): it forgets its velocity and takes theirs. Inflated measurements would bring it back
+// ten times slower and would explain the difference by a tilt that is not there.
 //
 // At the start the accelerometer gives the tilt, so that its bias and the tilt's error are one: theta = z x (R b_a)/g +
 // own error. P starts with that correlation: without it the filter would count the accelerometer twice.

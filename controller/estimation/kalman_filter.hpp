@@ -14,6 +14,7 @@
 // the update its owner moves x into the nominal state and sets it to zero.
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -32,8 +33,8 @@ class KalmanFilter {
   struct Innovation {
     Measurement y = Measurement::Zero();                      ///< unit of z
     MeasurementCovariance S = MeasurementCovariance::Zero();  ///< unit of z squared
-    double nis =
-        std::numeric_limits<double>::quiet_NaN();  ///< chi^2 of m degrees of freedom; NaN: S not positive definite
+    /// chi^2 of m degrees of freedom. NaN: S is not positive definite, or z or the filter is not finite.
+    double nis = std::numeric_limits<double>::quiet_NaN();
   };
 
   State x = State::Zero();
@@ -61,11 +62,11 @@ class KalmanFilter {
     return innovation_of(z, H, R, StateTimesMeasurement(P.lazyProduct(H.transpose()))).first;
   }
 
-  /// Takes the measurement z. Changes nothing where S is not positive definite (then the result's nis is NaN).
+  /// Takes the measurement z. Changes nothing where the result's nis is NaN.
   Innovation update(const Measurement& z, const MeasurementMatrix& H, const MeasurementCovariance& R) noexcept {
     const StateTimesMeasurement PHt = P.lazyProduct(H.transpose());
     const auto [innovation, cholesky] = innovation_of(z, H, R, PHt);
-    if (cholesky.info() != Eigen::Success) return innovation;
+    if (std::isnan(innovation.nis)) return innovation;
     const StateTimesMeasurement K = cholesky.solve(PHt.transpose()).transpose();
     x += K * innovation.y;
     P -= K.lazyProduct(PHt.transpose());
@@ -86,7 +87,8 @@ class KalmanFilter {
     innovation.y = z - H * x;
     innovation.S = H * PHt + R;
     const Cholesky cholesky(innovation.S);
-    if (cholesky.info() == Eigen::Success) innovation.nis = innovation.y.dot(cholesky.solve(innovation.y));
+    const double nis = innovation.y.dot(cholesky.solve(innovation.y));
+    if (cholesky.info() == Eigen::Success && std::isfinite(nis)) innovation.nis = nis;
     return {innovation, cholesky};
   }
 

@@ -4,6 +4,7 @@
 #include <catch2/catch_test_macros.hpp>
 #include <catch2/matchers/catch_matchers_floating_point.hpp>
 #include <cmath>
+#include <limits>
 #include <random>
 
 namespace stance::estimation {
@@ -169,12 +170,17 @@ TEST_CASE("NisAndNeesOfAMatchedModelLieWithinTheirChiSquaredBounds") {
   CHECK(std::abs(nees - nees_freedom) < 5.0 * std::sqrt(2.0 * nees_freedom));
 }
 
-TEST_CASE("MeasurementWithoutACovarianceChangesNothing") {
+TEST_CASE("MeasurementThatIsNoNumberOrHasNoCovarianceChangesNothing") {
   const Ball ball;
+  const Eigen::Matrix3d I = Eigen::Matrix3d::Identity();
+  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
+  constexpr double kInfinity = std::numeric_limits<double>::infinity();
   BallFilter filter;
   const BallFilter before = filter;
-  const auto innovation = filter.update(Eigen::Vector3d::Ones(), ball.H, -10.0 * Eigen::Matrix3d::Identity());
-  CHECK(std::isnan(innovation.nis));
+  CHECK(std::isnan(filter.update(Eigen::Vector3d::Ones(), ball.H, -10.0 * I).nis));
+  CHECK(std::isnan(filter.update(Eigen::Vector3d::Ones(), ball.H, kNan * I).nis));
+  CHECK(std::isnan(filter.update({0.0, kNan, 0.0}, ball.H, I).nis));
+  CHECK(std::isnan(filter.update({kInfinity, 0.0, 0.0}, ball.H, I).nis));
   CHECK(filter.x == before.x);
   CHECK(filter.P == before.P);
 }
