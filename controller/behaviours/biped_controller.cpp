@@ -158,7 +158,7 @@ void BipedController::plan(int periods, Trace& trace) noexcept {
   where.rpy.z() = math::unwrap(where.rpy.z(), memory_.yaw);
   memory_.yaw = where.rpy.z();
   // A stance that was given up (damped) is taken up anew.
-  if (!memory_.standing || ladder_.mode() == SafetyMode::kDamp) stand_.enter(memory_.yaw);
+  if (!memory_.standing || ladder_.mode() == SafetyMode::kDamp) stand_.enter();
   memory_.standing = true;
 
   const Vector3 radius(0.0, 0.0, feet_[0].radius);

@@ -1,6 +1,7 @@
 #include "controller/behaviours/stand.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 namespace stance::behaviours {
 namespace {
@@ -50,8 +51,7 @@ Stand::Stand(const StandConfig& config, const ForceLimits& limits, const force_q
       centroidal::riccati_terminal_cost(dynamics, config.state_weights, problem_.stages.front().R);
 }
 
-void Stand::enter(double yaw) noexcept {
-  yaw_ref_ = yaw;
+void Stand::enter() noexcept {
   height_integral_ = 0.0;
   height_offset_ = 0.0;
   qp_->reset();
@@ -66,6 +66,9 @@ void Stand::plan(const StandInput& input, StandOutput& out) noexcept {
   height_integral_ += config_.height_integral_gain * dt * (height_ref - input.p_WC.z());
   height_integral_ = std::clamp(height_integral_, -config_.height_integral_limit, config_.height_integral_limit);
 
+  // Square to the feet, whatever the estimated yaw drifts by.
+  const Vector3 feet = p_WG_[0] - p_WG_[1];
+  yaw_ref_ = math::unwrap(std::atan2(-feet.x(), feet.y()), input.rpy.z());
   R_WH_ = math::rotation_z(yaw_ref_);
   p_ref_W_ = {middle.x(), middle.y(), height_ref + height_integral_};
   // The trunk's angular velocity that carries the whole robot's angular momentum.

@@ -1,7 +1,7 @@
 #pragma once
 // Standing on two point feet: the reference, and the force QP that keeps it.
 //
-// The QP is written in the heading frame of the stand, H (yaw_ref, constant): theta = (roll, pitch, yaw - yaw_ref), the rest
+// The QP is written in the heading frame H of the stand, square to the line through the feet (yaw_ref): theta = (roll, pitch, yaw - yaw_ref), the rest
 // of x and the forces turned by Rz(yaw_ref)^T. There the model is time-invariant, with three things that standing needs:
 //   the coupling term (p against the force reference m g, see centroidal.hpp),
 //   the inertia I_eff = d L_C / d omega_trunk with the feet held, and omega := I_eff^-1 L_C,
@@ -35,8 +35,8 @@ class Stand {
   Stand(const StandConfig& config, const ForceLimits& limits, const force_qp::Settings& qp, double mass,
         const Matrix3& inertia, const std::array<Vector3, 2>& nominal_r, double nominal_height);
 
-  /// Takes up the stance: the heading and the height integral start here.
-  void enter(double yaw) noexcept;
+  /// Takes up the stance: the height integral starts here.
+  void enter() noexcept;
 
   /// The reference, x and the linear model of this tick.
   void plan(const StandInput& input, StandOutput& out) noexcept;
