@@ -29,6 +29,7 @@ LINK_COLOUR = "#7d8b99"
 FAR_LINK_COLOUR = "#b4bec8"
 TRUNK_COLOUR = "#dfe6ec"
 CONE_HEIGHT = 0.22  # m, of the drawn friction cones
+POINTS_PER_METRE = 190.0  # of a drawing, roughly
 KEY_FORCE = 50.0  # N, of the arrow that shows the scale
 
 
@@ -279,12 +280,14 @@ def _trunk_extent(body: Robot, pose: Pose, view: str) -> float:
 
 
 def _arrow(ax: Axes, start: Array, end: Array, colour: str, width: float, order: int) -> None:
+    """An arrow [m], `width` [points] wide; short ones have a small head."""
+    head = min(6.0 * width, 0.7 * POINTS_PER_METRE * float(np.linalg.norm(np.asarray(end) - start)))
     ax.add_patch(
         FancyArrowPatch(
             (float(start[0]), float(start[1])),
             (float(end[0]), float(end[1])),
             arrowstyle="-|>",
-            mutation_scale=6.0 * width,
+            mutation_scale=head,
             lw=width,
             color=colour,
             shrinkA=0,

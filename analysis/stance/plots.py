@@ -134,15 +134,12 @@ def timing(run: Run) -> Figure:
         ax.set_ylabel("period [ms]")
     else:
         ax.plot(time[1:], (period[1:] - deadline) / 1000, color=style.TRUTH, lw=0.6)
-        ax.set_title(f"Tick period less its nominal {deadline / 1000:g} ms")
         ax.set_ylabel("deviation [ms]")
         missed = metrics.missed_by_tick(run)
         rows = np.flatnonzero(missed)
-        if len(rows):
-            ax.plot(
-                time[rows], (period[rows] - deadline) / 1000, "v", color=style.BAD, ms=5, label=f"{missed.sum()} missed"
-            )
-            ax.legend(loc="upper right")
+        ax.plot(time[rows], (period[rows] - deadline) / 1000, "v", color=style.BAD, ms=5)
+        told = f"{missed.sum()} missed, marked" if len(rows) else "none missed"
+        ax.set_title(f"Tick period less its nominal {deadline / 1000:g} ms: {told}")
     shade(ax, run, label=True)
 
     ax = axes["stages"]
@@ -472,7 +469,7 @@ def joints(run: Run) -> Figure:
                 ax.plot(time, values, color=style.JOINTS[place % 8], lw=1.0, label=names[joint])
             ax.axhline(1.0, color=style.BAD, lw=0.9)
             largest = metrics._nanmax(shares[quantity])
-            ax.set_ylim(0.0, max(1.08, 1.05 * min(largest or 0.0, 3.0)))
+            ax.set_ylim(0.0, max(1.18, 1.05 * min(largest or 0.0, 3.0)))
             if largest is not None and largest < 0.3:
                 ax.set_ylim(0.0, max(1.25 * largest, 0.02))
         axes[0, column].set_title(title)

@@ -24,6 +24,7 @@ READY_TIMEOUT = 15.0  # s, for a program to show that it is there
 SILENCE_TIMEOUT = 20.0  # s without a ROBOT_STATE, after which a run is given up
 STOP_TIMEOUT = 5.0  # s from SIGINT to SIGKILL
 DRAIN_TIME = 0.3  # s for the last messages to reach the logger
+RECEIVE_BUFFER = 32 << 20  # bytes
 FELL = 1  # stance-sim's exit code for a robot that fell
 TAIL_LINES = 12
 
@@ -97,9 +98,8 @@ def record(request: RunRequest, progress: Progress | None = None) -> RunOutcome:
             f"LCM cannot start on {request.url}: no multicast route here; try --network namespace"
         ) from error
     with announced("stance run", request.url), _Interruption() as interruption, _Children(request.out) as children:
-        logger = children.start(
-            "lcm-logger", [str(logger_program), "--force", "--quiet", f"--lcm-url={request.url}", str(log)]
-        )
+        logger_options = ["--force", "--quiet", f"--lcm-url={_patient(request.url)}", str(log)]
+        logger = children.start("lcm-logger", [*_hurried(), str(logger_program), *logger_options])
         listener.wait(lambda: _is_logging(listener, log), logger, interruption, "it records nothing")
         controller = children.start(
             "stance-controller", [str(programs["stance-controller"]), *request.controller_arguments()]
@@ -124,6 +124,28 @@ def record(request: RunRequest, progress: Progress | None = None) -> RunOutcome:
         wall=time.monotonic() - started,
         notes=notes,
     )
+
+
+def _patient(url: str) -> str:
+    """The URL with as large a receive buffer as the kernel allows: the logger may be kept waiting for the processor."""
+    try:
+        allowed = int(Path("/proc/sys/net/core/rmem_max").read_text())
+    except (OSError, ValueError):
+        return url
+    if not url.startswith("udpm:") or "recv_buf_size" in url:
+        return url
+    return f"{url}{'&' if '?' in url else '?'}recv_buf_size={min(allowed, RECEIVE_BUFFER)}"
+
+
+def _hurried() -> list[str]:
+    """What makes a command come before ordinary ones and after controller and simulator, where that is allowed.
+
+    lcm-logger drops messages once 30 wait to be handled, and in lockstep they come every few tens of microseconds.
+    """
+    command = ["chrt", "--fifo", "1"]
+    if shutil.which("chrt") is None or subprocess.run([*command, "true"], capture_output=True).returncode != 0:
+        return []
+    return command
 
 
 def _option(name: str, value: object) -> list[str]:
