@@ -18,6 +18,7 @@ from .style import new_figure, shade, styled, time_axis
 
 WIDTH = 11.0  # inch
 CONTACT_FORCE = 5.0  # N, normal force above which the truth counts as a contact
+PARTS = (*metrics.STAGES, "publish, rest")  # of a tick: its stages, and what they leave of it
 TAIL = ((0.5, "p50"), (0.01, "p99"), (0.001, "p99.9"))  # share of ticks above → name
 
 
@@ -119,6 +120,7 @@ def timing(run: Run) -> Figure:
     time = run.time("CONTROLLER_TIMING")
     stage = run.field("CONTROLLER_TIMING", "stage_us")
     tick = run.field("CONTROLLER_TIMING", "tick_us")
+    stage = np.column_stack([stage, np.maximum(tick - stage.sum(axis=1), 0.0)])
     deadline = 1e6 * metrics.period(run)
     axes = fig.subplot_mosaic(
         [["period", "period"], ["stages", "stages"], ["histogram", "tail"], ["bars", "tail"]],
@@ -143,7 +145,7 @@ def timing(run: Run) -> Figure:
     shade(ax, run, label=True)
 
     ax = axes["stages"]
-    ax.stackplot(time, stage.T, colors=style.STAGES, labels=metrics.STAGES, lw=0)
+    ax.stackplot(time, stage.T, colors=style.STAGES, labels=PARTS, lw=0)
     ax.set_title("Where each tick's time goes")
     ax.set_ylabel("wall time [µs]")
     top = float(np.percentile(tick, 99.5)) * 1.35
@@ -235,11 +237,11 @@ def _tail(ax: Axes, quantities: list[tuple[str, Array, str]], deadline: float) -
 
 
 def _stage_bars(ax: Axes, stage: Array) -> None:
-    for place in range(len(metrics.STAGES)):
+    for place in range(len(PARTS)):
         found = Percentiles.of(stage[:, place])
         if found is None or found.max <= 0.0:
             continue
-        y = len(metrics.STAGES) - 1 - place
+        y = len(PARTS) - 1 - place
         colour = style.STAGES[place]
         low = max(found.p50, 0.1)
         ax.plot([low, max(found.max, low)], [y, y], color=colour, lw=5, alpha=0.35, solid_capstyle="butt")
@@ -255,11 +257,11 @@ def _stage_bars(ax: Axes, stage: Array) -> None:
             fontsize=7.5,
             color=style.MUTED,
         )
-    ax.set_yticks(range(len(metrics.STAGES)), metrics.STAGES[::-1])
+    ax.set_yticks(range(len(PARTS)), PARTS[::-1])
     ax.set_xscale("log")
     low, high = ax.get_xlim()
     ax.set_xlim(max(low, 0.05), high * 12)
-    ax.set_ylim(-0.7, len(metrics.STAGES) - 0.3)
+    ax.set_ylim(-0.7, len(PARTS) - 0.3)
     ax.set_xlabel("time [µs]")
     ax.set_title("Each stage: p50 / p99 / max [µs]")
     ax.grid(axis="y", visible=False)
