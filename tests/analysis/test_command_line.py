@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import os
 import signal
@@ -193,6 +194,17 @@ class Stance:
         return process.returncode, out, err
 
 
+def children_of(pid: int) -> list[str]:
+    """Process ids, without needing a program that may not be installed."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):  # others come and go
+            name, _, fields = path.read_text().rpartition(")")
+            if int(fields.split()[1]) == pid:
+                found.append(name.split()[0])
+    return found
+
+
 @pytest.fixture
 def stance(tmp_path: Path) -> Stance:
     return Stance(tmp_path)
@@ -249,9 +261,7 @@ def test_ctrl_c_ends_every_process_and_leaves_a_readable_log_and_others_can_join
     assert code == 0
     assert "url udpm://239.255.76.67:7667?ttl=0" in out
     assert os.readlink(f"/proc/{process.pid}/ns/net") in out
-    children = subprocess.run(
-        ["pgrep", "-P", str(process.pid)], capture_output=True, text=True, check=False
-    ).stdout.split()
+    children = children_of(process.pid)
     assert len(children) == 3
     process.send_signal(signal.SIGINT)
     _, err = process.communicate(timeout=30)
