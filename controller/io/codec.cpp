@@ -110,6 +110,14 @@ bool decode(Bytes bytes, TraceKey& out) noexcept {
   return true;
 }
 
+std::optional<std::int64_t> tick_of(std::string_view channel, Bytes bytes) noexcept {
+  joint_command_t command{};
+  if (channel == io::channel::kJointCommand && decode_whole(bytes, command)) return command.seq;
+  force_plan_t plan{};
+  if (channel == io::channel::kForcePlan && decode_whole(bytes, plan)) return plan.seq;
+  return std::nullopt;
+}
+
 void encode(const Header& header, const JointCommand& command, Message& out) noexcept {
   joint_command_t message{};
   set_header(header, message);

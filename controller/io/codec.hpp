@@ -3,7 +3,9 @@
 #include <array>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <span>
+#include <string_view>
 
 #include "controller/interface/signals.hpp"
 
@@ -70,6 +72,8 @@ struct TraceKey {
   Consumed consumed;
 };
 [[nodiscard]] bool decode(Bytes bytes, TraceKey& out) noexcept;
+/// The tick that a JOINT_COMMAND or FORCE_PLAN is of; nothing for another channel or broken bytes.
+std::optional<std::int64_t> tick_of(std::string_view channel, Bytes bytes) noexcept;
 
 /// Room for the largest message that the controller publishes.
 inline constexpr std::size_t kMaxMessageBytes = 8192;

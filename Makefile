@@ -1,0 +1,60 @@
+# The two commands: `make demo` and `make test`. Each sets up what is missing first.
+ROBOT ?= biped
+SCENARIO ?= demo
+PRESET ?= release
+# Two compilers at once need about 3 GB.
+JOBS ?= $(shell nproc)
+PYTHON := .venv/bin/python
+
+.PHONY: help setup build test demo check check-asan check-tsan check-debug lint bench format lock clean
+
+help:
+	@echo "make demo    $(ROBOT) in scenario '$(SCENARIO)' over LCM: log, report, plots, verdict (ROBOT=..., SCENARIO=...)"
+	@echo "make test    build, and every test"
+	@echo "make check   lint, and the tests in debug, under address, undefined-behaviour and thread sanitizers"
+	@echo "make bench   the benchmarks; make study  the standing study of the README; make build; make format; make clean"
+
+setup:
+	@setup/setup.sh
+
+build: setup
+	@cmake --preset $(PRESET) > build-$(PRESET).log 2>&1 || { cat build-$(PRESET).log; rm -f build-$(PRESET).log; exit 1; }
+	@rm -f build-$(PRESET).log
+	@cmake --build --preset $(PRESET) --parallel $(JOBS)
+
+test: build
+	ctest --preset $(PRESET)
+	$(PYTHON) -m pytest
+
+demo: build
+	@.venv/bin/stance run --robot $(ROBOT) --scenario $(SCENARIO) --realtime
+
+check: lint check-debug check-asan check-tsan
+
+lint: setup
+	.venv/bin/ruff check analysis tests
+	.venv/bin/ruff format --check analysis tests
+	.venv/bin/mypy
+
+check-debug check-asan check-tsan: check-%:
+	@$(MAKE) --no-print-directory build PRESET=$*
+	ctest --preset $*
+
+bench: build
+	build/release/bin/bench_force_qp
+	$(PYTHON) tests/bench/tick.py
+
+study: build
+	.venv/bin/stance study stand
+
+format:
+	clang-format -i $$(git ls-files '*.cpp' '*.hpp')
+	.venv/bin/ruff format analysis tests
+
+# Resolves setup/python.in anew; needs `uv` and the network.
+lock:
+	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \
+	  --no-header --no-annotate setup/python.in -o setup/python.lock
+
+clean:
+	rm -rf build runs
