@@ -1,6 +1,6 @@
 #include "controller/centroidal/centroidal.hpp"
 
-#include <Eigen/Eigenvalues>
+#include <Eigen/Cholesky>
 #include <Eigen/LU>
 #include <cmath>
 #include <sstream>
@@ -19,12 +19,14 @@ constexpr int kMaxDoublings = 50;             // 2^50 stages
 constexpr double kDoublingTolerance = 1e-14;  // of the last step, relative to P
 constexpr double kResidualTolerance = 1e-8;   // of the equation, relative to P
 
+// Set-up only: dynamic sizes are compiled once, where fixed ones are unrolled everywhere.
+using Eigen::MatrixXd;
+
 /// Right side of the Riccati equation at P.
-StateMatrix riccati_map(const Dynamics& dynamics, const StateVector& Q, const ForceVector& R, const StateMatrix& P) {
-  const ForceMatrix Quu = ForceMatrix(R.asDiagonal()) + dynamics.B.transpose() * P * dynamics.B;
-  const Eigen::MatrixXd Qux = dynamics.B.transpose() * P * dynamics.A;
-  return StateMatrix(Q.asDiagonal()) + dynamics.A.transpose() * P * dynamics.A -
-         Qux.transpose() * Quu.ldlt().solve(Qux);
+MatrixXd riccati_map(const MatrixXd& A, const MatrixXd& B, const MatrixXd& Q, const MatrixXd& R, const MatrixXd& P) {
+  const MatrixXd Quu = R + B.transpose() * P * B;
+  const MatrixXd Qux = B.transpose() * P * A;
+  return Q + A.transpose() * P * A - Qux.transpose() * Quu.llt().solve(Qux);
 }
 
 [[noreturn]] void throw_unstabilisable(const char* what, double value) {
@@ -66,25 +68,29 @@ StateMatrix riccati_terminal_cost(const Dynamics& dynamics, const StateVector& Q
                                   const ForceVector& R_diagonal) {
   // Each doubling of (E, G, H) squares the number of stages that H accounts for:
   //   W = (I + G H)^-1,   E <- E W E,   G <- G + E W G E^T,   H <- H + E^T H W E,   H -> P
-  StateMatrix E = dynamics.A;
-  StateMatrix G = dynamics.B * R_diagonal.cwiseInverse().asDiagonal() * dynamics.B.transpose();
-  StateMatrix H = Q_diagonal.asDiagonal();
+  const MatrixXd A = dynamics.A;
+  const MatrixXd B = dynamics.B;
+  const MatrixXd Q = Q_diagonal.asDiagonal();
+  const MatrixXd R = R_diagonal.asDiagonal();
+  const MatrixXd I = MatrixXd::Identity(kStates, kStates);
+  MatrixXd E = A;
+  MatrixXd G = B * R.llt().solve(B.transpose());
+  MatrixXd H = Q;
   double step = 0.0;
   for (int doubling = 0; doubling < kMaxDoublings; ++doubling) {
-    const Eigen::PartialPivLU<StateMatrix> lu(StateMatrix::Identity() + G * H);
-    const StateMatrix WE = lu.solve(E);
-    const StateMatrix WG = lu.solve(G);
-    const StateMatrix dH = E.transpose() * H * WE;
-    G += E * WG * E.transpose();
-    G = (0.5 * (G + G.transpose())).eval();
+    const Eigen::PartialPivLU<MatrixXd> W(I + G * H);
+    const MatrixXd WE = W.solve(E);
+    const MatrixXd dG = E * W.solve(G) * E.transpose();
+    const MatrixXd dH = E.transpose() * H * WE;
+    G += 0.5 * (dG + dG.transpose());
     H += 0.5 * (dH + dH.transpose());
     E = (E * WE).eval();
     step = dH.norm() / H.norm();
     if (!std::isfinite(step)) break;
     if (step <= kDoublingTolerance) {
-      const double residual = (riccati_map(dynamics, Q_diagonal, R_diagonal, H) - H).norm() / H.norm();
+      const double residual = (riccati_map(A, B, Q, R, H) - H).norm() / H.norm();
       if (!(residual <= kResidualTolerance)) throw_unstabilisable("the relative residual of the equation", residual);
-      return H;
+      return 0.5 * (H + H.transpose());
     }
   }
   throw_unstabilisable("the relative step of the last doubling", step);

@@ -5,15 +5,17 @@
 //
 // The constraints that are active at a contact fix some of its three components as functions of the others:
 //
-//   f_k = T_k w_k + t_k      e.g. fx = +mu fz:  T = [0 0 mu; 0 1 0; 0 0 1], t = 0;   fz = fz_max:  T = [1 0 0; 0 1 0; 0
-//   0 0], t = (0, 0, fz_max)
+//   f_k = T_k w_k + t_k     fx = +mu fz:  T = [0 0 mu; 0 1 0; 0 0 1],  t = 0
+//                           fz = fz_max:  T = [1 0 0; 0 1 0; 0 0 0],   t = (0, 0, fz_max)
 //
 // T's columns are orthogonal, and a column of zeros with a weight of one stands for a component that is gone, so that
-// sizes stay fixed. With z_k = x_k - xref_k, z_0 = 0, and the cost-to-go (z' S z)/2 + s' z:
+// sizes stay fixed. With z_k = x_k - xref_k, z_0 = 0, the cost-to-go (z' S z)/2 + s' z, and B for B T:
 //
-//   V = S_(k+1) + Q,   Quu = T'RT + B'VB (B for B T),   Qux = B'VA,   K = Quu^-1 Qux,   S_k = A'VA - K' Qux
-//   d = A xref_k + B t + g - xref_(k+1),   h = V d + s_(k+1),   su = B'h + T'R (t - fref),   kf = Quu^-1 su,   s_k =
-//   A'h - K' su forward: w = -kf - K z
+//   V = S_(k+1) + Q              Quu = T'RT + B'VB                 Qux = B'VA
+//   K = Quu^-1 Qux               S_k = A'VA - K' Qux
+//   d = A xref_k + B t + g - xref_(k+1)
+//   h = V d + s_(k+1)            su = B'h + T'R (t - fref)         kf = Quu^-1 su
+//   s_k = A'h - K' su            forward: w = -kf - K z
 //
 // A = [I 0 D 0; 0 I 0 E; 0 C I 0; 0 0 0 I] and B = [0; Bv], as centroidal.hpp has them; every product uses it.
 #include <Eigen/Cholesky>

@@ -1,12 +1,12 @@
 #pragma once
 // The force QP: over N stages, states x_1..x_N (12) and forces f_0..f_(N-1) (3 per contact),
 //
-//   min  sum_k ||x_k - xref_k||^2_Q + ||f_k - fref_k||^2_R    (the last state weighs P instead of Q where P is given)
-//   s.t. x_(k+1) = A_k x_k + B_k f_k + g_k,    |fx|, |fy| <= mu fz,    fz_min <= fz <= fz_max  for each contact and
-//   stage;
-//        a contact in swing has fz_min = fz_max = 0, hence f = 0.
+//   min  sum_k ||x_k - xref_k||^2_Q + ||f_k - fref_k||^2_R     (the last state weighs P instead of Q where P is given)
+//   s.t. x_(k+1) = A_k x_k + B_k f_k + g_k
+//        |fx|, |fy| <= mu fz,   fz_min <= fz <= fz_max         for each contact and stage; fz_max = 0 in swing
 //
-// Sizes and sparsity are frozen at set-up: a contact change alters bounds and values, never dimensions.
+// A and B have the structure of centroidal.hpp. Sizes and sparsity are frozen at set-up: a contact change alters bounds
+// and values, never dimensions. What the engines do is told in osqp_engine.hpp.
 #include <memory>
 #include <vector>
 

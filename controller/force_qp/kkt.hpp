@@ -1,12 +1,14 @@
 #pragma once
 // The independent check of a force QP's solution: computed outside every solver, from the problem and the forces alone.
 //
-//   states      x_(k+1) = A_k x_k + B_k f_k + g_k
-//   costates    lambda_N = P (x_N - xref_N)  (Q where no P is given),   lambda_k = Q (x_k - xref_k) + A_k^T
-//   lambda_(k+1) gradient    d_k = R (f_k - fref_k) + B_k^T lambda_(k+1), of half the cost residual    f - projection(f
-//   - d / min R), contact by contact, on the contact's truncated friction pyramid; zero at the
-//               solution and nowhere else. Where no constraint is active it is at least as large as the distance in f
-//               to the solution, in the norm of R; so it is read in N.
+//   states     x_(k+1) = A_k x_k + B_k f_k + g_k
+//   costates   lambda_N = P (x_N - xref_N), with Q for P where none is given;
+//              lambda_k = Q (x_k - xref_k) + A_k^T lambda_(k+1)
+//   gradient   d_k = R (f_k - fref_k) + B_k^T lambda_(k+1), of half the cost
+//   residual   f - projection(f - d / min R) [N], each contact on its truncated friction pyramid
+//
+// The residual is zero at the solution and nowhere else. Where no constraint is active it is at least as large as the
+// distance from f to the solution, both in the norm of each contact's min R.
 #include <vector>
 
 #include "controller/force_qp/force_qp.hpp"

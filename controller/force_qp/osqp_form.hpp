@@ -1,17 +1,16 @@
 #pragma once
-// The force QP as OSQP takes it, in two forms over the same friction rows. Forces are in units of the typical force F =
-// m g.
+// The force QP as OSQP takes it, in two forms over the same friction rows. Forces in units of the typical one: u = f/F.
 //
-// Friction rows of a contact, with u = f/F and bounds l, u of each row:
-//   u_x - mu u_z <= 0,   u_x + mu u_z >= 0,   the same for y,   fz_min/F <= u_z <= fz_max/F;     in swing all five are
-//   zero
+// Friction rows of a contact, all five zero in swing:
+//   u_x - mu u_z <= 0      u_x + mu u_z >= 0      the same for y      fz_min/F <= u_z <= fz_max/F
 //
-// Condensed: variables u_0..u_(N-1). With the states eliminated the cost is 1/2 u'Hu + h'u; block (i, j <= i) of H is
-//   F^2 (B_i' V_(i+1) A_i ... A_(j+1) B_j + delta_ij R),   V_k = Q + A_k' V_(k+1) A_k,   h = F * gradient at f = 0
-// Sparse: variables (u_k, z_(k+1)) by stage, z = x - xref, and rows z_(k+1) - A_k z_k - F B_k u_k = A_k xref_k + g_k -
-// xref_(k+1).
+// Condensed: variables u_0..u_(N-1). With the states eliminated the cost is 1/2 u'Hu + h'u, and of H block (i, j <= i)
+//   F^2 (B_i' V_(i+1) A_i ... A_(j+1) B_j + delta_ij R)      V_k = Q + A_k' V_(k+1) A_k      h = F gradient at f = 0
 //
-// The cost is divided by the mean of its diagonal, so that rho means the same whatever the weights.
+// Sparse: variables (u_k, z_(k+1)) by stage, z = x - xref, and rows
+//   z_(k+1) - A_k z_k - F B_k u_k = A_k xref_k + g_k - xref_(k+1)
+//
+// The cost is divided by the mean of its diagonal over the forces, so that rho means the same whatever the weights.
 #include <memory>
 #include <vector>
 

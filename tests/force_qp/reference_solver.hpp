@@ -1,6 +1,7 @@
 #pragma once
-// The force QP solved by other means, for tests: states eliminated by brute force, a primal-dual interior point in extended
-// precision. Slow, without structure, and within 1e-7 N of the solution also where a constraint is only weakly active.
+// The force QP solved by other means, for tests: states eliminated by brute force, a primal-dual interior point in
+// extended precision. Slow, without structure, and within 1e-7 N of the solution also where a constraint is only
+// weakly active.
 #include <Eigen/Cholesky>
 #include <vector>
 
