@@ -6,7 +6,7 @@ PRESET ?= release
 JOBS ?= $(shell nproc)
 PYTHON := .venv/bin/python
 
-.PHONY: help setup build test demo check check-asan check-tsan check-debug lint bench format lock clean
+.PHONY: help setup build test demo check check-asan check-tsan check-debug lint bench format lock clean study
 
 help:
 	@echo "make demo    $(ROBOT) in scenario '$(SCENARIO)' over LCM: log, report, plots, verdict (ROBOT=..., SCENARIO=...)"
@@ -45,7 +45,8 @@ bench: build
 	$(PYTHON) tests/bench/tick.py
 
 study: build
-	.venv/bin/stance study stand
+	-.venv/bin/stance study --scenario stand --scales 1.0 1.1
+	-.venv/bin/stance study --scenario stand_noisy --scales 0.6 0.7 0.8 0.9 1.0 --seed 20000
 
 format:
 	clang-format -i $$(git ls-files '*.cpp' '*.hpp')

@@ -191,6 +191,24 @@ def _export(options: argparse.Namespace) -> int:
     return GOOD
 
 
+def _study(options: argparse.Namespace) -> int:
+    from .run import progress_bar
+    from .study import as_dict, as_text, standing_pushes, summarise
+
+    with progress_bar(options.silent) as progress:
+        trials = standing_pushes(
+            options.scenario,
+            options.scales,
+            options.moments,
+            options.seed,
+            workers=options.workers,
+            progress=progress,
+        )
+    cells = summarise(trials)
+    _print(options, as_dict(cells, trials), lambda: as_text(cells))
+    return GOOD if all(cell.survived == cell.trials for cell in cells) else LIMIT_VIOLATED
+
+
 def _doctor(options: argparse.Namespace) -> int:
     from dataclasses import asdict
 
@@ -313,6 +331,13 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("format", choices=("parquet", "csv", "mat"))
     _add_log(export, with_run=True)
     export.add_argument("--out", type=Path, metavar="PATH", help="a directory, or the .mat file (default: by the log)")
+
+    study = add("study", _study, "Pushes on the standing biped, in 8 directions on an ellipse; exit 1 where it falls.")
+    study.add_argument("--scenario", default="stand", help="what the pushes are added to (default: stand)")
+    study.add_argument("--scales", nargs="+", type=_positive, default=[1.0], help="of the ellipse (0.8, 4) N s")
+    study.add_argument("--moments", type=int, default=5, help="pushes in each direction (default: 5)")
+    study.add_argument("--seed", type=int, default=10_000, help="of the moments and the noise (default: 10000)")
+    study.add_argument("--workers", type=int, help="rollouts at once (default: one for each core)")
 
     shell = add("shell", _shell, "A shell, or a command, in the network of a running `stance run` or `stance replay`.")
     shell.add_argument("--pid", type=int, help="of the process to join (default: the newest)")

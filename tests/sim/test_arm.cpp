@@ -34,7 +34,7 @@ drives: {damping: [0.1], command_timeout: 0.05}
 )";
 
 Simulator simulator() {
-  Scenario scenario = test::biped_scenario("stand_quiet");
+  Scenario scenario = test::biped_scenario("stand");
   scenario.robot = "pendulum";
   return {config::robot_from_texts(kYaml, kUrdf), scenario, {}};
 }

@@ -23,7 +23,7 @@ using stance_msgs::robot_state_t;
 struct Bench {
   explicit Bench(std::int64_t start_utime = 0)
       : robot(test::biped()),
-        scenario(test::biped_scenario("stand")),
+        scenario(test::biped_scenario("demo")),
         options{.seed = 3, .run_id = 11, .start_utime = start_utime, .plant = {}},
         lcm("memq://"),
         simulator(robot, scenario, options),

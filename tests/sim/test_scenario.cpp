@@ -7,16 +7,16 @@
 namespace stance::sim {
 namespace {
 
-std::string stand_text() { return config::read_text(config::share_directory() / "sim/scenarios/biped/stand.yaml"); }
+std::string demo_text() { return config::read_text(config::share_directory() / "sim/scenarios/biped/demo.yaml"); }
 
 /// The message of the error that `text` with `from` replaced by `to` makes; empty where it makes none.
 std::string error_of(const std::string& from, const std::string& to) {
-  std::string text = stand_text();
+  std::string text = demo_text();
   const auto at = text.find(from);
   REQUIRE(at != std::string::npos);
   text.replace(at, from.size(), to);
   try {
-    static_cast<void>(scenario_from_text(text, "stand.yaml"));
+    static_cast<void>(scenario_from_text(text, "demo.yaml"));
   } catch (const config::ConfigError& error) {
     return error.what();
   }
@@ -25,13 +25,13 @@ std::string error_of(const std::string& from, const std::string& to) {
 
 bool names(const std::string& message, const std::string& key) {
   INFO(message);
-  return message.find("stand.yaml") != std::string::npos && message.find(key) != std::string::npos;
+  return message.find("demo.yaml") != std::string::npos && message.find(key) != std::string::npos;
 }
 
 }  // namespace
 
 TEST_CASE("EveryScenarioOfTheBipedLoads") {
-  for (const char* name : {"stand", "stand_quiet", "single_body"}) {
+  for (const char* name : {"demo", "stand", "stand_noisy", "single_body"}) {
     const Scenario scenario = load_scenario("biped", name);
     CHECK(scenario.duration == 20.0);
     CHECK(scenario.robot == "biped");
@@ -40,7 +40,7 @@ TEST_CASE("EveryScenarioOfTheBipedLoads") {
 }
 
 TEST_CASE("TheStandScenarioPushesHalfANewtonSecondForwardAndThreeSideways") {
-  const Scenario scenario = load_scenario("biped", "stand");
+  const Scenario scenario = load_scenario("biped", "demo");
   REQUIRE(scenario.pushes.size() == 2);
   CHECK((scenario.pushes[0].force_W * scenario.pushes[0].duration - Vector3(0.5, 0.0, 0.0)).norm() < 1e-12);
   CHECK((scenario.pushes[1].force_W * scenario.pushes[1].duration - Vector3(0.0, 3.0, 0.0)).norm() < 1e-12);
@@ -48,7 +48,7 @@ TEST_CASE("TheStandScenarioPushesHalfANewtonSecondForwardAndThreeSideways") {
   CHECK(scenario.sensors.delay_steps == 1);
   CHECK(scenario.sensors.contact_delay_steps == 5);
   CHECK(scenario.sensors.noise.joint_position_resolution == 5e-4);
-  CHECK(load_scenario("biped", "stand_quiet").sensors.noise.gyro_white == 0.0);
+  CHECK(load_scenario("biped", "stand").sensors.noise.gyro_white == 0.0);
   CHECK(load_scenario("biped", "single_body").plant == Plant::kSingleBody);
 }
 
@@ -73,7 +73,7 @@ TEST_CASE("ScenarioErrorsNameTheKey") {
 }
 
 TEST_CASE("AWordForNoiseMustBeNone") {
-  std::string text = config::read_text(config::share_directory() / "sim/scenarios/biped/stand_quiet.yaml");
+  std::string text = config::read_text(config::share_directory() / "sim/scenarios/biped/stand.yaml");
   const auto at = text.find("noise: none");
   REQUIRE(at != std::string::npos);
   text.replace(at, 11, "noise: some");
@@ -87,7 +87,7 @@ TEST_CASE("AWordForNoiseMustBeNone") {
 
 TEST_CASE("AnUnknownScenarioAndAnotherRobotsAreErrors") {
   CHECK_THROWS_AS(load_scenario("biped", "no_such"), config::ConfigError);
-  const auto file = config::share_directory() / "sim/scenarios/biped/stand.yaml";
+  const auto file = config::share_directory() / "sim/scenarios/biped/demo.yaml";
   CHECK_NOTHROW(load_scenario("biped", file.string()));
   CHECK_THROWS_AS(load_scenario("catcher", file.string()), config::ConfigError);
 }

@@ -68,7 +68,7 @@ TEST_CASE("RandomNumbersAreStandardNormalAndTheSameForASeed") {
 }
 
 TEST_CASE("PerfectSensorsTellTheTruth") {
-  const SensorModel model = test::biped_scenario("stand_quiet").sensors;
+  const SensorModel model = test::biped_scenario("stand").sensors;
   rigid_body::State state = standing();
   state.w_WB_W = {0.1, 0.2, -0.3};
   state.qd.setConstant(0.4);
@@ -94,7 +94,7 @@ TEST_CASE("PerfectSensorsTellTheTruth") {
 }
 
 TEST_CASE("NoiseHasTheScenariosStatistics") {
-  SensorModel model = test::biped_scenario("stand").sensors;
+  SensorModel model = test::biped_scenario("demo").sensors;
   model.noise.gyro_bias_walk = 0.0;
   const SensorNoise& noise = model.noise;
   const rigid_body::State state = standing();
@@ -132,7 +132,7 @@ TEST_CASE("NoiseHasTheScenariosStatistics") {
 }
 
 TEST_CASE("TheGyrosBiasWalks") {
-  SensorModel model = test::biped_scenario("stand_quiet").sensors;
+  SensorModel model = test::biped_scenario("stand").sensors;
   model.noise.gyro_bias_walk = 2e-3;
   Statistics walked;
   for (std::uint64_t seed = 0; seed < 400; ++seed) {
@@ -148,7 +148,7 @@ TEST_CASE("TheGyrosBiasWalks") {
 }
 
 TEST_CASE("SeedsChooseTheSignsOfBiasesAndOffsets") {
-  const SensorModel model = test::biped_scenario("stand").sensors;
+  const SensorModel model = test::biped_scenario("demo").sensors;
   const rigid_body::State state = standing();
   int positive_gyro = 0, positive_offset = 0;
   for (std::uint64_t seed = 0; seed < 200; ++seed) {
@@ -168,7 +168,7 @@ TEST_CASE("SeedsChooseTheSignsOfBiasesAndOffsets") {
 }
 
 TEST_CASE("TheAccelerometerKeepsImpactsAndSaturates") {
-  const SensorModel model = test::biped_scenario("stand_quiet").sensors;
+  const SensorModel model = test::biped_scenario("stand").sensors;
   rigid_body::State before;
   before.q = standing().q;
   rigid_body::State after = before;
@@ -188,7 +188,7 @@ TEST_CASE("TheAccelerometerKeepsImpactsAndSaturates") {
 }
 
 TEST_CASE("ImuAndEncodersAreLateAlikeAndSwitchesByTheirOwnDelay") {
-  SensorModel model = test::biped_scenario("stand_quiet").sensors;
+  SensorModel model = test::biped_scenario("stand").sensors;
   model.delay_steps = 3;
   model.contact_delay_steps = 5;
   const rigid_body::State still = standing();
@@ -209,7 +209,7 @@ TEST_CASE("ImuAndEncodersAreLateAlikeAndSwitchesByTheirOwnDelay") {
 }
 
 TEST_CASE("SwitchesCloseAtTheirThreshold") {
-  const SensorModel model = test::biped_scenario("stand_quiet").sensors;
+  const SensorModel model = test::biped_scenario("stand").sensors;
   const rigid_body::State state = standing();
   Sensors sensors(model, kJoints, kFeet, state, loads(0.0), 1);
   ContactVectors forces = loads(model.contact_threshold - 0.01);

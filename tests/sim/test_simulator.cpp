@@ -56,7 +56,7 @@ force_plan_t plan_for(const Simulator& simulator, const Vector3& left, const Vec
 }  // namespace
 
 TEST_CASE("TheFirstStateStandsInTheNominalPoseWithItsFeetInContact") {
-  Run run(test::biped_scenario("stand_quiet"), {.seed = 1, .run_id = 7, .start_utime = 1'000'000, .plant = {}});
+  Run run(test::biped_scenario("stand"), {.seed = 1, .run_id = 7, .start_utime = 1'000'000, .plant = {}});
   const robot_state_t& state = run.simulator.state();
   const truth_t& truth = run.simulator.truth();
   CHECK(state.seq == 1);
@@ -80,7 +80,7 @@ TEST_CASE("TheFirstStateStandsInTheNominalPoseWithItsFeetInContact") {
 }
 
 TEST_CASE("InstantsAreAControlPeriodApart") {
-  Run run(test::biped_scenario("stand"));
+  Run run(test::biped_scenario("demo"));
   for (int k = 0; k < 5; ++k) run.simulator.advance();
   CHECK(run.simulator.state().seq == 6);
   CHECK(run.simulator.state().utime == 50'000);
@@ -90,7 +90,7 @@ TEST_CASE("InstantsAreAControlPeriodApart") {
 
 TEST_CASE("TheSameSeedGivesTheSameBitsAndAnotherDoesNot") {
   const auto run = [](std::uint64_t seed) {
-    Run r(test::biped_scenario("stand"), {.seed = seed, .run_id = 1, .start_utime = 0, .plant = {}});
+    Run r(test::biped_scenario("demo"), {.seed = seed, .run_id = 1, .start_utime = 0, .plant = {}});
     std::vector<std::uint8_t> bytes;
     for (int k = 0; k < 60; ++k) {
       r.hold();
@@ -108,7 +108,7 @@ TEST_CASE("TheSameSeedGivesTheSameBitsAndAnotherDoesNot") {
 
 TEST_CASE("CommandsTakeEffectAfterTheScenariosLatency") {
   for (const int latency : {0, 1, 7, 10, 14}) {
-    Scenario scenario = test::biped_scenario("stand_quiet");
+    Scenario scenario = test::biped_scenario("stand");
     scenario.command_delay_steps = latency;
     Run run(scenario);
     joint_command_t command = test::hold_command(run.robot, run.simulator);
@@ -136,7 +136,7 @@ TEST_CASE("CommandsTakeEffectAfterTheScenariosLatency") {
 }
 
 TEST_CASE("DrivesDampWithin50msWithoutACommand") {
-  Run run(test::biped_scenario("stand_quiet"));
+  Run run(test::biped_scenario("stand"));
   for (int k = 0; k < 20; ++k) {
     run.hold();
     run.simulator.advance();
@@ -163,13 +163,13 @@ TEST_CASE("DrivesDampWithin50msWithoutACommand") {
 }
 
 TEST_CASE("DrivesDampWhenNoCommandEverComes") {
-  Run run(test::biped_scenario("stand_quiet"));
+  Run run(test::biped_scenario("stand"));
   for (int k = 0; k < 5; ++k) run.simulator.advance();
   CHECK(run.simulator.truth().drives_damped == 1);
 }
 
 TEST_CASE("TruthCountsEachKindOfRefusal") {
-  Run run(test::biped_scenario("stand_quiet"));
+  Run run(test::biped_scenario("stand"));
   for (int k = 0; k < 10; ++k) {
     run.hold();
     run.simulator.advance();
@@ -198,8 +198,8 @@ TEST_CASE("TruthCountsEachKindOfRefusal") {
 }
 
 TEST_CASE("ARefusedCommandChangesNothing") {
-  Run spoiled(test::biped_scenario("stand_quiet"));
-  Run left_alone(test::biped_scenario("stand_quiet"));
+  Run spoiled(test::biped_scenario("stand"));
+  Run left_alone(test::biped_scenario("stand"));
   for (Run* run : {&spoiled, &left_alone}) run->hold();
   joint_command_t command = test::hold_command(spoiled.robot, spoiled.simulator);
   command.seq += 1;
@@ -210,9 +210,9 @@ TEST_CASE("ARefusedCommandChangesNothing") {
 }
 
 TEST_CASE("APushOnRequestStartsAtOnceAndGivesItsImpulse") {
-  Run pushed(test::biped_scenario("stand_quiet"));
-  Run left_alone(test::biped_scenario("stand_quiet"));
-  Scenario flight = test::biped_scenario("stand_quiet");
+  Run pushed(test::biped_scenario("stand"));
+  Run left_alone(test::biped_scenario("stand"));
+  Scenario flight = test::biped_scenario("stand");
   flight.initial.foot_clearance = 5.0;
   Run flying(flight), flying_alone(flight);
   push_t push{};
@@ -242,7 +242,7 @@ TEST_CASE("APushOnRequestStartsAtOnceAndGivesItsImpulse") {
 }
 
 TEST_CASE("AScheduledPushGivesItsImpulseWhateverItsTimes") {
-  Scenario scenario = test::biped_scenario("stand_quiet");
+  Scenario scenario = test::biped_scenario("stand");
   scenario.pushes = {{0.01234, 0.0567, {10.0, 0.0, 0.0}, {0.0, 0.0, 0.1}}};
   Run run(scenario);
   double impulse = 0.0;
@@ -254,7 +254,7 @@ TEST_CASE("AScheduledPushGivesItsImpulseWhateverItsTimes") {
 }
 
 TEST_CASE("TruthSaysHowFarTheContactForcesAreFromThePlan") {
-  Run run(test::biped_scenario("stand_quiet"));
+  Run run(test::biped_scenario("stand"));
   run.simulator.advance();
   CHECK(run.simulator.truth().plan_seq == 0);
   CHECK(vector(run.simulator.truth().force_error[0]).norm() == 0.0);
@@ -280,7 +280,7 @@ TEST_CASE("TruthSaysHowFarTheContactForcesAreFromThePlan") {
 }
 
 TEST_CASE("UserCommandsAreGivenWhenTheyAreDue") {
-  Scenario scenario = test::biped_scenario("stand_quiet");
+  Scenario scenario = test::biped_scenario("stand");
   scenario.commands = {{0, Behaviour::kStand, {0.0, 0.0}, 0.0, 0.0}, {3, Behaviour::kWalk, {0.4, -0.1}, 0.2, -0.05}};
   Run run(scenario);
   REQUIRE(run.simulator.user_command() != nullptr);
@@ -301,7 +301,7 @@ TEST_CASE("UserCommandsAreGivenWhenTheyAreDue") {
 }
 
 TEST_CASE("ALimpRobotFallsAndTruthSaysSoForGood") {
-  Run run(test::biped_scenario("stand_quiet"));
+  Run run(test::biped_scenario("stand"));
   for (int k = 0; k < 300 && !run.simulator.fallen(); ++k) run.simulator.advance();
   REQUIRE(run.simulator.fallen());
   for (int k = 0; k < 10; ++k) run.simulator.advance();
@@ -309,7 +309,7 @@ TEST_CASE("ALimpRobotFallsAndTruthSaysSoForGood") {
 }
 
 TEST_CASE("MassFactorsChangeThePlantAndNotTheDescription") {
-  Scenario scenario = test::biped_scenario("stand_quiet");
+  Scenario scenario = test::biped_scenario("stand");
   const auto robot = test::biped();
   Run nominal(scenario);
   scenario.trunk_mass_factor = 1.2;
@@ -466,7 +466,7 @@ TEST_CASE("TheSingleBodysJointsKeepTheFeetWhereTheyAre") {
 }
 
 TEST_CASE("TheOptionsPlantStandsInPlaceOfTheScenarios") {
-  Run run(test::biped_scenario("stand_quiet"), {.seed = 1, .run_id = 1, .start_utime = 0, .plant = Plant::kSingleBody});
+  Run run(test::biped_scenario("stand"), {.seed = 1, .run_id = 1, .start_utime = 0, .plant = Plant::kSingleBody});
   run.simulator.advance();
   // Nothing bears the single body before a plan comes.
   CHECK(std::abs(run.simulator.truth().v_WC[2] + kGravity * kControlPeriod) < 1e-9);
