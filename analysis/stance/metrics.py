@@ -478,6 +478,23 @@ def planned_forces(run: Run) -> tuple[Floats, Floats, Array]:
     return run.time("FORCE_PLAN"), force, run.field("FORCE_PLAN", "contact")[:, 0, :used] != 0
 
 
+def planned_cone_share(run: Run, mu: float) -> Floats:
+    """Share of the friction pyramid used by stage 0 of every plan, (n, contacts); nan where there is no load.
+
+    The pyramid's sides are those of the force QP: along the reference's heading, not along W's axes.
+    """
+    _, force, contact = planned_forces(run)
+    yaw = np.zeros(len(force))
+    if "CONTROLLER_TRACE" in run:
+        rows = match(run.field("FORCE_PLAN", "seq"), run.field("CONTROLLER_TRACE", "seq"))
+        yaw = np.where(rows >= 0, run.field("CONTROLLER_TRACE", "x_ref")[rows, 2], 0.0)
+    cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
+    along = cos * force[..., 0] + sin * force[..., 1]
+    across = cos * force[..., 1] - sin * force[..., 0]
+    heading_force = np.stack([along, across, force[..., 2]], axis=-1)
+    return np.asarray(np.where(contact, cone_share(heading_force, mu), np.nan))
+
+
 def cone_share(force: Array, mu: float) -> Floats:
     """max(|fx|, |fy|) / (mu fz) of forces [N] (..., 3) → (...): 1 is the cone's edge; nan where there is no load."""
     normal = np.where(force[..., 2] > MIN_NORMAL_FORCE, force[..., 2], np.nan)
@@ -494,8 +511,7 @@ def friction(run: Run) -> Friction:
     mu = configuration.friction(run)
     share = ratio = None
     if "FORCE_PLAN" in run and mu:
-        _, force, contact = planned_forces(run)
-        share = _nanmax(np.where(contact, cone_share(force, mu), np.nan))
+        share = _nanmax(planned_cone_share(run, mu))
     if "TRUTH" in run:
         ratio = _nanmax(friction_ratio(run.field("TRUTH", "f_F_W")[:, : num_contacts(run)]))
     return Friction(mu, share, ratio)

@@ -348,13 +348,13 @@ def forces(run: Run) -> Figure:
             if mu:
                 column[3].plot(time, metrics.friction_ratio(true) / mu, color=colour, lw=1.2, label="simulated")
         if "FORCE_PLAN" in run:
-            time, planned, contact = metrics.planned_forces(run)
+            time, planned, _ = metrics.planned_forces(run)
             for row in range(3):
                 column[row].plot(
                     time, planned[:, foot, row], color=style.PLANNED, lw=0.9, ls=(0, (4, 1.5)), label="commanded"
                 )
             if mu:
-                share = np.where(contact[:, foot], metrics.cone_share(planned[:, foot], mu), np.nan)
+                share = metrics.planned_cone_share(run, mu)[:, foot]
                 column[3].plot(time, share, color=style.PLANNED, lw=0.9, ls=(0, (4, 1.5)), label="commanded")
         column[3].axhline(1.0, color=style.BAD, lw=0.9)
         column[3].set_ylim(0.0, 1.12)
