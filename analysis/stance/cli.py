@@ -60,6 +60,7 @@ def _run(options: argparse.Namespace) -> int:
         seed=options.seed,
         solver=options.solver,
         plant=options.plant,
+        run_id=options.run_id,
     )
     with progress_bar(options.silent) as progress:
         outcome = record(request, progress)
@@ -289,6 +290,7 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--seed", type=int, help="of the scenario's random numbers")
     run.add_argument("--solver", help="the controller's force QP engine")
     run.add_argument("--plant", help="the simulator's plant")
+    run.add_argument("--run-id", type=int, help="stands in every message (default: 1 in lockstep, else the time)")
     run.add_argument("--out", type=Path, metavar="DIR", help="where everything goes (default: runs/<time>-...)")
     run.add_argument("--no-report", action="store_true", help="only the log")
     _add_limits(run)

@@ -48,6 +48,8 @@ class RunRequest:
     seed: int | None = None
     solver: str | None = None
     plant: str | None = None
+    run_id: int | None = None
+    """stands in every message; the simulator chooses where it is None"""
     url: str = LCM_URL
 
     @property
@@ -58,7 +60,12 @@ class RunRequest:
         return ["--robot", self.robot, self.clock, *_option("--solver", self.solver), "--lcm-url", self.url]
 
     def simulator_arguments(self) -> list[str]:
-        chosen = (("--duration", self.duration), ("--seed", self.seed), ("--plant", self.plant))
+        chosen = (
+            ("--duration", self.duration),
+            ("--seed", self.seed),
+            ("--plant", self.plant),
+            ("--run-id", self.run_id),
+        )
         options = [part for name, value in chosen for part in _option(name, value)]
         return ["--robot", self.robot, "--scenario", self.scenario, self.clock, *options, "--lcm-url", self.url]
 

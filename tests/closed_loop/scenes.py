@@ -1,0 +1,160 @@
+"""What the closed-loop tests do inside a network of their own. Run as `python scenes.py SCENE OUT`; prints JSON."""
+
+from __future__ import annotations
+
+import json
+import os
+import random
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import lcm
+from stance.network import LCM_URL
+from stance.programs import find_lcm_tool, find_program
+from stance.run import RunRequest, record
+from stance_msgs import controller_trace_t, truth_t
+
+LOCKSTEP_DURATION = 9.0  # s: past the demo's first push
+REAL_TIME_DURATION = 3.0  # s
+RUN_ID = 1  # stance-rollout's own
+
+
+def request(out: Path, realtime: bool, duration: float) -> RunRequest:
+    return RunRequest(out=out, scenario="demo", realtime=realtime, duration=duration, seed=3, run_id=RUN_ID)
+
+
+def lockstep(out: Path) -> dict[str, Any]:
+    return {"fell": record(request(out, False, LOCKSTEP_DURATION)).fell}
+
+
+def lockstep_with_false_truth(out: Path) -> dict[str, Any]:
+    """Somebody else says TRUTH all the time, and nothing that it says is true."""
+    done = threading.Event()
+    sent = 0
+
+    def lie() -> None:
+        nonlocal sent
+        network, lies = lcm.LCM(LCM_URL), random.Random(1)
+        message = truth_t()
+        while not done.is_set():
+            message.seq = lies.randrange(1, 2000)
+            message.p_WB = [lies.gauss(0, 5) for _ in range(3)]
+            message.joint_position = [lies.gauss(0, 5) for _ in range(8)]
+            network.publish("TRUTH", message.encode())
+            sent += 1
+            time.sleep(0.0005)
+
+    liar = threading.Thread(target=lie)
+    liar.start()
+    try:
+        result = lockstep(out)
+    finally:
+        done.set()
+        liar.join()
+    return {**result, "lies": sent}
+
+
+def real_time(out: Path) -> dict[str, Any]:
+    return {"fell": record(request(out, True, REAL_TIME_DURATION)).fell}
+
+
+class Listener:
+    """Keeps the newest TRUTH and CONTROLLER_TRACE, and every change of what the test asks about."""
+
+    def __init__(self) -> None:
+        self.network = lcm.LCM(LCM_URL)
+        self.truth: truth_t | None = None
+        self.trace: controller_trace_t | None = None
+        self.network.subscribe("TRUTH", self._on_truth)
+        self.network.subscribe("CONTROLLER_TRACE", self._on_trace)
+
+    def _on_truth(self, _: str, data: bytes) -> None:
+        self.truth = truth_t.decode(data)
+
+    def _on_trace(self, _: str, data: bytes) -> None:
+        self.trace = controller_trace_t.decode(data)
+
+    def wait(self, condition: Callable[[], bool], seconds: float) -> bool:
+        """True once it holds; False after so many seconds of wall time."""
+        end = time.monotonic() + seconds
+        while time.monotonic() < end:
+            self.network.handle_timeout(20)
+            if condition():
+                return True
+        return False
+
+
+def kill_controller(out: Path) -> dict[str, Any]:
+    """SIGKILL to the controller while the robot stands; another one takes over when the robot lies."""
+    out.mkdir(parents=True)
+    controller_command = [str(find_program("stance-controller")), "--robot", "biped"]
+    listener = Listener()
+    controller = subprocess.Popen(controller_command)
+    time.sleep(1.0)
+    with (out / "sim.txt").open("w") as said:
+        words = ["--robot", "biped", "--scenario", "stand", "--duration", "6", "--run-id", "5"]
+        simulator = subprocess.Popen([str(find_program("stance-sim")), *words], stderr=said)
+    stood = listener.wait(
+        lambda: listener.truth is not None and listener.truth.utime > 0 and listener.truth.seq > 100, 20
+    )
+    controller.send_signal(signal.SIGKILL)
+    controller.wait()
+    last_answered = listener.trace.state_seq if listener.trace else 0
+    damped = listener.wait(lambda: bool(listener.truth and listener.truth.drives_damped), 5)
+    damped_seq = listener.truth.seq if listener.truth else 0
+    listener.wait(lambda: bool(listener.truth and listener.truth.seq > damped_seq + 150), 10)  # it falls
+    listener.trace = None
+    controller = subprocess.Popen(controller_command)
+    accepted = listener.wait(lambda: bool(listener.truth and not listener.truth.drives_damped), 5)
+    reported = listener.wait(
+        lambda: bool(listener.trace and listener.trace.faults & (1 << listener.trace.ROBOT_FALLEN)), 5
+    )
+    damps = listener.wait(lambda: bool(listener.trace and listener.trace.safety >= listener.trace.DAMP), 5)
+    simulator.wait(timeout=30)
+    controller.send_signal(signal.SIGINT)
+    controller.wait(timeout=10)
+    return {
+        "stood": stood,
+        "damped": damped,
+        "damped_after_s": (damped_seq - last_answered) * 0.01,
+        "accepted": accepted,
+        "reported_fallen": reported,
+        "damps": damps,
+        "said": (out / "sim.txt").read_text(),
+    }
+
+
+def kill_logger(out: Path) -> dict[str, Any]:
+    """SIGKILL to the logger in the middle of a run."""
+    out.mkdir(parents=True)
+    log = out / "run.lcmlog"
+    logger = subprocess.Popen([str(find_lcm_tool("lcm-logger")), "--quiet", f"--lcm-url={LCM_URL}", str(log)])
+    controller = subprocess.Popen([str(find_program("stance-controller")), "--robot", "biped"])
+    time.sleep(1.0)
+    simulator = subprocess.Popen(
+        [str(find_program("stance-sim")), "--robot", "biped", "--scenario", "stand", "--duration", "4"]
+    )
+    time.sleep(2.5)
+    logger.send_signal(signal.SIGKILL)
+    logger.wait()
+    simulator.wait(timeout=30)
+    controller.send_signal(signal.SIGINT)
+    controller.wait(timeout=10)
+    return {"log": str(log), "size": os.path.getsize(log)}
+
+
+if __name__ == "__main__":
+    scene = {
+        "lockstep": lockstep,
+        "lockstep_with_false_truth": lockstep_with_false_truth,
+        "real_time": real_time,
+        "kill_controller": kill_controller,
+        "kill_logger": kill_logger,
+    }[sys.argv[1]]
+    print(json.dumps(scene(Path(sys.argv[2]))))

@@ -1,0 +1,122 @@
+"""The real programs over real LCM: the same bits however they are run, and what happens when one of them dies."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from stance import network
+from stance.log import Log
+from stance.programs import find_program
+from stance.replay import verify
+
+SCENES = Path(__file__).with_name("scenes.py")
+DECISIONS = ("JOINT_COMMAND", "FORCE_PLAN", "CONTROLLER_TRACE")
+
+
+def play(scene: str, out: Path) -> dict[str, Any]:
+    """A scene in a network of its own, or in the host's where that is the loopback."""
+    prefix = [] if network.host_is_loopback() else network.namespace_command()
+    assert prefix is not None, network.refusal()
+    done = subprocess.run(
+        [*prefix, sys.executable, str(SCENES), scene, str(out)],
+        env={**os.environ, network.INSIDE: "1"},
+        capture_output=True,
+        text=True,
+        timeout=120,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    result: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    return result
+
+
+def payloads(log: Path, channel: str, count: int) -> list[bytes]:
+    """The first `count` different messages of a channel, in order of tick: a state sent again is answered again."""
+    import lcm
+
+    found = [event.data for event in lcm.EventLog(str(log)) if event.channel == channel]
+    return list(dict.fromkeys(found))[:count]
+
+
+@pytest.fixture(scope="module")
+def lockstep(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    out = tmp_path_factory.mktemp("lockstep") / "run"
+    assert play("lockstep", out)["fell"] is False
+    return out / "run.lcmlog"
+
+
+@pytest.fixture(scope="module")
+def rollout(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    log = tmp_path_factory.mktemp("rollout") / "run.lcmlog"
+    words = ["--robot", "biped", "--scenario", "demo", "--duration", "9", "--seed", "3", "--log", str(log)]
+    subprocess.run([str(find_program("stance-rollout")), *words], check=True, capture_output=True)
+    return log
+
+
+def assert_same_decisions(first: Path, second: Path) -> None:
+    for channel in DECISIONS:
+        one, other = payloads(first, channel, 900), payloads(second, channel, 900)
+        assert len(one) == len(other) == 900, channel
+        assert one == other, channel
+
+
+def test_lockstep_over_lcm_equals_the_rollout_byte_for_byte(lockstep: Path, rollout: Path) -> None:
+    assert_same_decisions(lockstep, rollout)
+
+
+def test_lockstep_over_lcm_twice_gives_the_same_bytes(lockstep: Path, tmp_path: Path) -> None:
+    play("lockstep", tmp_path / "again")
+    assert_same_decisions(lockstep, tmp_path / "again" / "run.lcmlog")
+
+
+def test_a_false_truth_changes_no_decision(lockstep: Path, tmp_path: Path) -> None:
+    assert play("lockstep_with_false_truth", tmp_path / "lied")["lies"] > 100
+    assert_same_decisions(lockstep, tmp_path / "lied" / "run.lcmlog")
+
+
+def test_a_log_replays_bit_for_bit(lockstep: Path, rollout: Path, tmp_path: Path) -> None:
+    assert play("real_time", tmp_path / "real")["fell"] is False
+    for log in (lockstep, rollout, tmp_path / "real" / "run.lcmlog"):
+        done = verify(log, capture=True)
+        assert done.returncode == 0, done.stdout
+        assert " 0 differ" in done.stdout
+
+
+def test_a_changed_state_does_not_replay(rollout: Path, tmp_path: Path) -> None:
+    """The verification can fail: one bit of one sensor is enough."""
+    import lcm
+
+    spoiled = tmp_path / "spoiled.lcmlog"
+    log = lcm.EventLog(str(spoiled), "w", overwrite=True)
+    states = 0
+    for event in lcm.EventLog(str(rollout)):
+        data = bytearray(event.data)
+        if event.channel == "ROBOT_STATE":
+            states += 1
+            if states == 400:
+                data[60] ^= 1  # of a gyro's mantissa
+        log.write_event(event.timestamp, event.channel, bytes(data))
+    log.close()
+    assert verify(spoiled, capture=True).returncode == 1
+
+
+def test_a_killed_controller_leaves_a_damped_robot_and_a_new_one_reports_the_fall(tmp_path: Path) -> None:
+    result = play("kill_controller", tmp_path / "killed")
+    assert result["stood"] and result["damped"]
+    assert result["damped_after_s"] <= 0.05 + 0.01  # seen in steps of the control period
+    assert "damp" in result["said"]
+    assert result["accepted"] and result["reported_fallen"] and result["damps"]
+
+
+def test_a_killed_logger_leaves_a_log_that_reads_up_to_its_end(tmp_path: Path) -> None:
+    result = play("kill_logger", tmp_path / "logger")
+    run = Log.open(Path(result["log"])).run()
+    assert run.count("ROBOT_STATE") > 50
+    assert np.all(np.diff(run.field("ROBOT_STATE", "seq")) > 0)
