@@ -32,15 +32,15 @@ SafetyMode FaultLadder::step(int periods) noexcept {
 
   SafetyMode next = mode_;
   if (mode_ == SafetyMode::kStop) return mode_;
-  if (mode_ == SafetyMode::kDamp && time_in_mode_ > config_.damp_time + rounding) {
+  if (mode_ == SafetyMode::kDamp && time_in_mode_ >= config_.damp_time - rounding) {
     next = SafetyMode::kStop;
   } else if (latched_) {
     next = SafetyMode::kDamp;
   } else if ((finished_faults_ & passing) == 0) {
     next = SafetyMode::kRun;
-  } else if (mode_ == SafetyMode::kRun) {
+  } else if (mode_ == SafetyMode::kRun && config_.hold_time > 0.0) {
     next = SafetyMode::kHold;
-  } else if (mode_ == SafetyMode::kHold && time_in_mode_ > config_.hold_time + rounding) {
+  } else if (mode_ == SafetyMode::kRun || time_in_mode_ >= config_.hold_time - rounding) {
     next = SafetyMode::kDamp;
   }
   if (next != mode_) {
