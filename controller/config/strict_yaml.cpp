@@ -38,14 +38,27 @@ StrictYaml StrictYaml::parse(const std::string& text, const std::string& name) {
   }
   if (!node.IsMap()) throw ConfigError(name + ": must be a mapping of keys to values");
   StrictYaml root(node, name, "");
-  // yaml-cpp keeps the first of two equal keys and says nothing.
-  std::vector<std::string> keys;
-  for (const auto& entry : node) {
-    const auto key = entry.first.as<std::string>();
-    if (std::find(keys.begin(), keys.end(), key) != keys.end()) root.fail(key, "stands twice");
-    keys.push_back(key);
-  }
+  root.check_keys();
   return root;
+}
+
+void StrictYaml::check_keys() const {
+  std::vector<std::string> keys;
+  for (const auto& entry : node_) {
+    if (!entry.first.IsScalar()) fail("a key", "is a list or a mapping, but must be a name");
+    const std::string& key = entry.first.Scalar();
+    if (std::find(keys.begin(), keys.end(), key) != keys.end()) fail(key, "stands twice");
+    keys.push_back(key);
+    if (entry.second.IsMap()) StrictYaml(entry.second, file_, path_ + key + ".").check_keys();
+    if (!entry.second.IsSequence()) continue;
+    for (std::size_t i = 0; i < entry.second.size(); ++i) {
+      if (entry.second[i].IsMap()) StrictYaml(entry.second[i], file_, entry_path(key, i)).check_keys();
+    }
+  }
+}
+
+std::string StrictYaml::entry_path(const std::string& key, std::size_t index) const {
+  return path_ + key + "[" + std::to_string(index + 1) + "].";
 }
 
 bool StrictYaml::has(const std::string& key) const { return static_cast<bool>(node_[key]); }
@@ -105,7 +118,7 @@ std::vector<StrictYaml> StrictYaml::mappings(const std::string& key) {
   if (!list.IsSequence()) fail(key, "must be a list");
   for (std::size_t i = 0; i < list.size(); ++i) {
     if (!list[i].IsMap()) fail(key, "entry " + std::to_string(i + 1) + " must be a mapping of keys to values");
-    entries.push_back(StrictYaml(list[i], file_, path_ + key + "[" + std::to_string(i + 1) + "]."));
+    entries.push_back(StrictYaml(list[i], file_, entry_path(key, i)));
   }
   return entries;
 }

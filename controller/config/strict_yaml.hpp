@@ -17,7 +17,8 @@ class ConfigError : public std::invalid_argument {
 /// One mapping of a YAML document. Keys are required unless read with `optional`; `finish()` refuses the keys that nobody read.
 class StrictYaml {
  public:
-  /// Parses `text`; `name` stands in messages (a file's name). Throws ConfigError where it is no YAML mapping.
+  /// Parses `text`; `name` stands in messages (a file's name). Throws ConfigError where it is no YAML mapping, or a key stands
+  /// twice in one mapping.
   static StrictYaml parse(const std::string& text, const std::string& name);
 
   bool has(const std::string& key) const;
@@ -48,6 +49,9 @@ class StrictYaml {
  private:
   StrictYaml(YAML::Node node, std::string file, std::string path);
   YAML::Node require(const std::string& key);
+  /// Refuses, here and below, a key that stands twice (yaml-cpp keeps the first and says nothing) or is no name.
+  void check_keys() const;
+  std::string entry_path(const std::string& key, std::size_t index) const;
 
   YAML::Node node_;
   std::string file_;
