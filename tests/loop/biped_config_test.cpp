@@ -1,0 +1,261 @@
+#include <array>
+#include <catch2/catch_message.hpp>
+#include <catch2/catch_test_macros.hpp>
+#include <catch2/matchers/catch_matchers_exception.hpp>
+#include <catch2/matchers/catch_matchers_string.hpp>
+#include <fstream>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "controller/config/biped_config_yaml.hpp"
+#include "tests/loop/biped_rig.hpp"
+
+namespace stance::config {
+namespace {
+
+using Catch::Matchers::ContainsSubstring;
+using Catch::Matchers::Message;
+using Catch::Matchers::MessageMatches;
+using test::biped;
+using test::biped_yaml_with;
+
+/// One mapping of the controller's section, and the steps that lead there.
+struct Mapping {
+  std::string path;  ///< "controller." or "controller.safety."
+  std::vector<std::string> steps;
+  std::vector<std::string> keys;
+};
+
+void find_mappings(const YAML::Node& node, const Mapping& here, std::vector<Mapping>& found) {
+  Mapping mapping = here;
+  for (const auto& entry : node) {
+    const auto key = entry.first.as<std::string>();
+    mapping.keys.push_back(key);
+    if (!entry.second.IsMap()) continue;
+    Mapping below{here.path + key + ".", here.steps, {}};
+    below.steps.push_back(key);
+    find_mappings(entry.second, below, found);
+  }
+  found.push_back(mapping);
+}
+
+std::vector<Mapping> controller_mappings() {
+  std::vector<Mapping> found;
+  find_mappings(YAML::Load(biped().yaml_text)["controller"], {"controller.", {"controller"}, {}}, found);
+  return found;
+}
+
+/// The biped's YAML with one of its mappings changed.
+std::string edited(const std::vector<std::string>& steps, const std::function<void(YAML::Node&)>& edit) {
+  YAML::Node root = YAML::Load(biped().yaml_text);
+  std::vector<YAML::Node> way{root};
+  for (const std::string& step : steps) way.push_back(way.back()[step]);
+  edit(way.back());
+  return YAML::Dump(root);
+}
+
+}  // namespace
+
+TEST_CASE("TheBipedsOwnConfigurationIsRead") {
+  const behaviours::BipedConfig c = biped_config_from_yaml(biped().yaml_text);
+  const YAML::Node yaml = YAML::Load(biped().yaml_text)["controller"];
+  CHECK(c.last_link_pitch == yaml["last_link_pitch"].as<double>());
+  CHECK(c.estimator.initial_accelerometer_bias_sigma ==
+        yaml["estimator"]["initial_accelerometer_bias_sigma"].as<double>());
+  CHECK(c.com_offset_observer.bandwidth == yaml["com_offset_observer"]["bandwidth"].as<double>());
+  CHECK(c.com_offset_quiet_momentum == yaml["com_offset_observer"]["quiet_momentum"].as<double>());
+  CHECK(c.force_qp.engine == QpEngine::kOsqpCondensed);
+  CHECK(c.force_qp.max_iterations == yaml["force_qp"]["max_iterations"].as<int>());
+  CHECK(c.force_limits.normal_force_max == yaml["force_qp"]["normal_force_max"].as<double>());
+  CHECK(c.stand.stages == yaml["stand"]["stages"].as<int>());
+  for (int i = 0; i < 12; ++i) CHECK(c.stand.state_weights[i] == yaml["stand"]["state_weights"][i].as<double>());
+  CHECK(c.torque_map.lead == yaml["torque_map"]["lead"].as<double>());
+  CHECK(c.fault_ladder.hold_time == yaml["safety"]["hold_time"].as<double>());
+  CHECK(c.fault_ladder.damp_time == yaml["safety"]["damp_time"].as<double>());
+  CHECK(c.damping == yaml["safety"]["damping"].as<double>());
+  CHECK(c.fall.min_upright == yaml["safety"]["min_upright"].as<double>());
+  CHECK(c.fall.min_height == yaml["safety"]["min_height"].as<double>());
+  CHECK(c.validation.joint_velocity_factor == yaml["safety"]["joint_velocity_factor"].as<double>());
+}
+
+TEST_CASE("AnyKeyOfTheControllersSectionThatIsMissingIsNamed") {
+  int removed = 0;
+  for (const Mapping& mapping : controller_mappings()) {
+    for (const std::string& key : mapping.keys) {
+      const std::string text = edited(mapping.steps, [&](YAML::Node& node) { node.remove(key); });
+      CAPTURE(mapping.path, key);
+      CHECK_THROWS_MATCHES(biped_config_from_yaml(text), ConfigError,
+                           Message("biped.yaml: " + mapping.path + key + " is missing"));
+      ++removed;
+    }
+  }
+  CHECK(removed > 50);
+  YAML::Node root = YAML::Load(biped().yaml_text);
+  root.remove("controller");
+  CHECK_THROWS_MATCHES(biped_config_from_yaml(YAML::Dump(root)), ConfigError,
+                       Message("biped.yaml: controller is missing"));
+}
+
+TEST_CASE("AnUnknownKeyInAnyMappingOfTheControllersSectionIsNamed") {
+  const std::vector<Mapping> mappings = controller_mappings();
+  CHECK(mappings.size() == 7);
+  for (const Mapping& mapping : mappings) {
+    const std::string text = edited(mapping.steps, [](YAML::Node& node) { node["surprise"] = 1; });
+    CAPTURE(mapping.path);
+    CHECK_THROWS_MATCHES(
+        biped_config_from_yaml(text), ConfigError,
+        MessageMatches(ContainsSubstring("biped.yaml: " + mapping.path + "surprise is not a known key")));
+  }
+}
+
+TEST_CASE("AnyValueOfTheControllersSectionThatIsAWordOrNotFiniteIsRefusedByItsPath") {
+  for (const Mapping& mapping : controller_mappings()) {
+    for (const std::string& key : mapping.keys) {
+      for (const char* value : {"surprise", ".nan", ".inf"}) {
+        const std::string text = edited(mapping.steps, [&](YAML::Node& node) { node[key] = YAML::Load(value); });
+        CAPTURE(mapping.path, key, value);
+        CHECK_THROWS_MATCHES(biped_config_from_yaml(text), ConfigError,
+                             MessageMatches(ContainsSubstring("biped.yaml: " + mapping.path + key + " ")));
+      }
+    }
+  }
+}
+
+TEST_CASE("AValueOutOfRangeIsRefusedByItsName") {
+  struct Case {
+    const char* path;
+    const char* value;
+    const char* named;
+  };
+  const std::array cases{
+      Case{"last_link_pitch", "1.6", "last_link_pitch"},
+      Case{"last_link_pitch", "-1.6", "last_link_pitch"},
+      Case{"estimator.gyro_noise", "-1e-6", "gyro_noise"},
+      Case{"estimator.accelerometer_noise", "0", "accelerometer_noise"},
+      Case{"estimator.swing_foot_noise", "0", "swing_foot_noise"},
+      Case{"estimator.foot_velocity_sigma", "0", "foot_velocity_sigma"},
+      Case{"estimator.foot_position_sigma", "0", "foot_position_sigma"},
+      Case{"estimator.contact_ramp", "0", "contact_ramp"},
+      Case{"estimator.slip_gate", "1", "slip_gate"},
+      Case{"estimator.slip_inflation", "0.5", "slip_inflation"},
+      Case{"estimator.initial_tilt_sigma", "-1", "initial_tilt_sigma"},
+      Case{"com_offset_observer.bandwidth", "-1", "bandwidth"},
+      Case{"com_offset_observer.bandwidth", "21", "bandwidth"},
+      Case{"com_offset_observer.limit", "0.3", "limit"},
+      Case{"com_offset_observer.quiet_momentum", "0", "quiet_momentum"},
+      Case{"force_qp.friction", "0", "friction"},
+      Case{"force_qp.normal_force_min", "-1", "normal_force_min"},
+      Case{"force_qp.normal_force_max", "5.0", "normal_force_max"},
+      Case{"force_qp.tolerance", "0.1", "tolerance"},
+      Case{"force_qp.tolerance", "0", "tolerance"},
+      Case{"force_qp.max_iterations", "0", "max_iterations"},
+      Case{"force_qp.max_primal_residual", "0", "max_primal_residual"},
+      Case{"stand.stages", "0", "stages"},
+      Case{"stand.stages", "101", "stages"},
+      Case{"stand.state_weights", "[1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, -1]", "state_weights"},
+      Case{"stand.force_weight", "0", "force_weight"},
+      Case{"stand.height_integral_gain", "-1", "height_integral_gain"},
+      Case{"stand.height_integral_limit", "-1", "height_integral_limit"},
+      Case{"torque_map.null_space_kp", "-1", "null_space_kp"},
+      Case{"torque_map.null_space_kd", "-1", "null_space_kd"},
+      Case{"torque_map.lead", "0.05", "lead"},
+      Case{"torque_map.lead", "-0.001", "lead"},
+      Case{"safety.hold_time", "0.21", "hold_time"},
+      Case{"safety.hold_time", "-0.01", "hold_time"},
+      Case{"safety.damp_time", "0", "damp_time"},
+      Case{"safety.damping", "-1", "damping"},
+      Case{"safety.min_upright", "0", "min_upright"},
+      Case{"safety.min_upright", "1", "min_upright"},
+      Case{"safety.min_height", "0", "min_height"},
+      Case{"safety.max_angular_velocity", "0", "max_angular_velocity"},
+      Case{"safety.max_acceleration", "-200", "max_acceleration"},
+      Case{"safety.joint_position_margin", "0", "joint_position_margin"},
+      Case{"safety.joint_velocity_factor", "0", "joint_velocity_factor"},
+  };
+  for (const Case& c : cases) {
+    CAPTURE(c.path, c.value);
+    CHECK_THROWS_MATCHES(biped_config_from_yaml(biped_yaml_with(std::string("controller.") + c.path, c.value)),
+                         ConfigError,
+                         MessageMatches(ContainsSubstring("biped.yaml: controller: ") && ContainsSubstring(c.named)));
+  }
+}
+
+TEST_CASE("AnUnknownEngineAndAWrongNumberOfWeightsAreRefusedByPath") {
+  CHECK_THROWS_MATCHES(
+      biped_config_from_yaml(biped_yaml_with("controller.force_qp.engine", "qpoases")), ConfigError,
+      Message("biped.yaml: controller.force_qp.engine is 'qpoases', but must be osqp-condensed or osqp-sparse"));
+  CHECK_THROWS_MATCHES(biped_config_from_yaml(biped_yaml_with("controller.stand.state_weights", "[1, 2]")), ConfigError,
+                       Message("biped.yaml: controller.stand.state_weights has 2 entries, but must have 12"));
+}
+
+TEST_CASE("WithEngineChangesTheEngineAndNothingElse") {
+  const std::string text = biped().yaml_text;
+  const std::string sparse = with_engine(text, "osqp-sparse");
+  CHECK(biped_config_from_yaml(sparse).force_qp.engine == QpEngine::kOsqpSparse);
+  YAML::Node before = YAML::Load(text), after = YAML::Load(sparse);
+  before["controller"]["force_qp"].remove("engine");
+  after["controller"]["force_qp"].remove("engine");
+  CHECK(YAML::Dump(before) == YAML::Dump(after));
+  CHECK_NOTHROW(compose(robot_from_texts(sparse, biped().urdf_text)));
+  CHECK_THROWS_MATCHES(compose(robot_from_texts(with_engine(text, "none"), biped().urdf_text)), ConfigError,
+                       MessageMatches(ContainsSubstring("controller.force_qp.engine is 'none'")));
+}
+
+TEST_CASE("ARobotWithoutAControllerIsRefusedByName") {
+  CHECK_THROWS_MATCHES(compose(test::biped_with("robot", "centipede")), ConfigError,
+                       MessageMatches(ContainsSubstring("centipede")));
+}
+
+TEST_CASE("TheBipedFromItsTextsIsTheBiped") {
+  const RobotDescription robot = robot_from_texts(biped().yaml_text, biped().urdf_text);
+  CHECK(robot.name == "biped");
+  CHECK(robot.model.num_joints == 8);
+  CHECK(robot.feet.size() == 2);
+  CHECK(robot.model.joints[0].name == robot.joint_names[0]);
+  CHECK(robot.model.total_mass > 0.0);
+}
+
+TEST_CASE("AnErrorInARobotsTextsIsNamed") {
+  struct Case {
+    const char* path;
+    const char* value;
+    const char* message;
+  };
+  const std::array cases{
+      Case{"surprise", "1", "biped.yaml: surprise is not a known key"},
+      Case{"joints", "[q0_l, q1_l, q2_l, q3_l, q0_r, q1_r, q2_r, q3_r, q4_r]",
+           "biped.yaml: joints has more than 8 entries"},
+      Case{"joints", "q0_l", "biped.yaml: joints must be a list of names"},
+      Case{"joints", "[q0_l, q1_l, q2_l, q3_l, q0_r, q1_r, q2_r, knee]", "biped URDF: "},
+      Case{"feet", "[tarsus_l, paw]", "paw"},
+      Case{"feet", "[tarsus_l, tarsus_r, a, b, c]", "biped.yaml: feet has more than 4 entries"},
+      Case{"nominal_joint_position", "[0, 0, 0]", "biped.yaml: nominal_joint_position has 3 entries, but must have 8"},
+      Case{"nominal_joint_position", "[0, -0.59, 9.0, -1.1, 0, -0.59, 1.44, -1.1]",
+           "biped.yaml: nominal_joint_position puts joint q2_l outside its limits"},
+      Case{"nominal_joint_position", "[0, -0.59, .nan, -1.1, 0, -0.59, 1.44, -1.1]",
+           "biped.yaml: nominal_joint_position is not finite"},
+  };
+  for (const Case& c : cases) {
+    CAPTURE(c.path, c.value);
+    CHECK_THROWS_MATCHES(robot_from_texts(biped_yaml_with(c.path, c.value), biped().urdf_text), ConfigError,
+                         MessageMatches(ContainsSubstring(c.message)));
+  }
+  for (const char* key : {"robot", "urdf", "joints", "feet", "nominal_joint_position"}) {
+    CAPTURE(key);
+    YAML::Node root = YAML::Load(biped().yaml_text);
+    root.remove(key);
+    CHECK_THROWS_MATCHES(robot_from_texts(YAML::Dump(root), biped().urdf_text), ConfigError,
+                         MessageMatches(ContainsSubstring(std::string(key) + " is missing")));
+  }
+  CHECK_THROWS_MATCHES(robot_from_texts(biped().yaml_text, "<robot"), ConfigError,
+                       MessageMatches(ContainsSubstring("biped URDF: ")));
+}
+
+TEST_CASE("ARobotThatIsNotThereIsRefusedByItsFile") {
+  CHECK_THROWS_MATCHES(
+      load_robot(share_directory() / "robots", "centipede"), ConfigError,
+      MessageMatches(ContainsSubstring("no robot 'centipede'") && ContainsSubstring("centipede.yaml")));
+}
+
+}  // namespace stance::config
