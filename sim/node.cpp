@@ -67,24 +67,25 @@ std::vector<std::uint8_t> encode_run_info(const config::RobotDescription& robot,
 Node::Node(lcm::LCM& lcm, Simulator& simulator, std::vector<std::uint8_t> run_info)
     : lcm_(lcm), simulator_(simulator), run_info_(std::move(run_info)) {
   constexpr int queue = 16;
-  lcm_.subscribe("JOINT_COMMAND", &Node::on_command, this)->setQueueCapacity(queue);
-  lcm_.subscribe("FORCE_PLAN", &Node::on_plan, this)->setQueueCapacity(queue);
-  lcm_.subscribe("PUSH", &Node::on_push, this)->setQueueCapacity(queue);
+  lcm_.subscribeFunction("JOINT_COMMAND", &Node::on_command, this)->setQueueCapacity(queue);
+  lcm_.subscribeFunction("FORCE_PLAN", &Node::on_plan, this)->setQueueCapacity(queue);
+  lcm_.subscribeFunction("PUSH", &Node::on_push, this)->setQueueCapacity(queue);
 }
 
-void Node::on_command(const lcm::ReceiveBuffer*, const std::string&, const stance_msgs::joint_command_t* command) {
+void Node::on_command(const Buffer*, const std::string&, const stance_msgs::joint_command_t* command, Node* node) {
   // A refused command is an answer, too: the drives do without it.
-  simulator_.accept(*command);
-  const bool ours = command->run_id == simulator_.state().run_id && command->state_seq <= simulator_.state().seq;
-  if (ours) answered_seq_ = std::max(answered_seq_, command->state_seq);
+  node->simulator_.accept(*command);
+  const auto& state = node->simulator_.state();
+  const bool ours = command->run_id == state.run_id && command->state_seq <= state.seq;
+  if (ours) node->answered_seq_ = std::max(node->answered_seq_, command->state_seq);
 }
 
-void Node::on_plan(const lcm::ReceiveBuffer*, const std::string&, const stance_msgs::force_plan_t* plan) {
-  simulator_.accept(*plan);
+void Node::on_plan(const Buffer*, const std::string&, const stance_msgs::force_plan_t* plan, Node* node) {
+  node->simulator_.accept(*plan);
 }
 
-void Node::on_push(const lcm::ReceiveBuffer*, const std::string&, const stance_msgs::push_t* push) {
-  simulator_.accept(*push);
+void Node::on_push(const Buffer*, const std::string&, const stance_msgs::push_t* push, Node* node) {
+  node->simulator_.accept(*push);
 }
 
 void Node::publish_state() {

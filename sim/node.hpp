@@ -52,9 +52,11 @@ class Node {
   NodeReport run_real_time(std::int64_t periods, std::int64_t start_ns, const std::atomic<bool>& stop);
 
  private:
-  void on_command(const lcm::ReceiveBuffer*, const std::string&, const stance_msgs::joint_command_t* command);
-  void on_plan(const lcm::ReceiveBuffer*, const std::string&, const stance_msgs::force_plan_t* plan);
-  void on_push(const lcm::ReceiveBuffer*, const std::string&, const stance_msgs::push_t* push);
+  // Handlers in LCM's way, for functions: those for methods do not get past GCC 12's undefined-behaviour sanitizer.
+  using Buffer = lcm::ReceiveBuffer;
+  static void on_command(const Buffer*, const std::string&, const stance_msgs::joint_command_t* command, Node* node);
+  static void on_plan(const Buffer*, const std::string&, const stance_msgs::force_plan_t* plan, Node* node);
+  static void on_push(const Buffer*, const std::string&, const stance_msgs::push_t* push, Node* node);
   void publish_instant();
   void publish_state();
   void publish_truth();

@@ -28,31 +28,31 @@ struct Bench {
         lcm("memq://"),
         simulator(robot, scenario, options),
         node(lcm, simulator, encode_run_info(robot, scenario, options, "--robot biped")) {
-    lcm.subscribe("ROBOT_STATE", &Bench::on_state, this)->setQueueCapacity(0);
+    lcm.subscribeFunction("ROBOT_STATE", &Bench::on_state, this)->setQueueCapacity(0);
     for (const char* channel : {"TRUTH", "USER_COMMAND", "RUN_INFO_SIMULATOR"}) {
-      lcm.subscribe(channel, &Bench::on_other, this)->setQueueCapacity(0);
+      lcm.subscribeFunction(channel, &Bench::on_other, this)->setQueueCapacity(0);
     }
   }
 
-  void on_state(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+  static void on_state(const lcm::ReceiveBuffer* buffer, const std::string& channel, Bench* bench) {
     const auto* data = static_cast<const std::uint8_t*>(buffer->data);
-    states.emplace_back(data, data + buffer->data_size);
-    order.push_back(channel);
+    bench->states.emplace_back(data, data + buffer->data_size);
+    bench->order.push_back(channel);
     robot_state_t state{};
     if (state.decode(data, 0, static_cast<int>(buffer->data_size)) <= 0) return;
-    if (silent_from > 0 && state.seq >= silent_from && ignored < ignore) {
-      ++ignored;
+    if (bench->silent_from > 0 && state.seq >= bench->silent_from && bench->ignored < bench->ignore) {
+      ++bench->ignored;
       return;
     }
-    joint_command_t command = test::hold_command(robot, simulator);
+    joint_command_t command = test::hold_command(bench->robot, bench->simulator);
     command.seq = command.state_seq = state.seq;
-    if (spoil_seq == state.seq) command.kp[0] = -1.0;
-    lcm.publish("JOINT_COMMAND", &command);
+    if (bench->spoil_seq == state.seq) command.kp[0] = -1.0;
+    bench->lcm.publish("JOINT_COMMAND", &command);
   }
-  void on_other(const lcm::ReceiveBuffer* buffer, const std::string& channel) {
+  static void on_other(const lcm::ReceiveBuffer* buffer, const std::string& channel, Bench* bench) {
     const auto* data = static_cast<const std::uint8_t*>(buffer->data);
-    order.push_back(channel);
-    others[channel].emplace_back(data, data + buffer->data_size);
+    bench->order.push_back(channel);
+    bench->others[channel].emplace_back(data, data + buffer->data_size);
   }
   void drain() {
     while (lcm.handleTimeout(1) > 0) {
