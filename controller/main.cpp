@@ -2,18 +2,46 @@
 #include <CLI/CLI.hpp>
 #include <atomic>
 #include <csignal>
+#include <iomanip>
 #include <iostream>
 
 #include "controller/compose.hpp"
 #include "controller/io/run_info.hpp"
 #include "controller/loop/loop.hpp"
 #include "controller/loop/real_time_setup.hpp"
+#include "controller/rigid_body/dynamics.hpp"
 
 namespace {
 
 std::atomic<bool> stop{false};
 static_assert(std::atomic<bool>::is_always_lock_free);
 void on_signal(int /*signal*/) { stop.store(true, std::memory_order_relaxed); }
+
+/// The robot as this program reads it, as JSON: what a contract with other readers is checked against.
+void describe(const stance::config::RobotDescription& robot) {
+  const auto& model = robot.model;
+  std::cout << std::setprecision(17) << "{\"robot\": \"" << robot.name << "\", \"total_mass\": " << model.total_mass
+            << ", \"joints\": [";
+  for (int i = 0; i < model.num_joints; ++i) {
+    const auto& joint = model.joints[static_cast<std::size_t>(i)];
+    std::cout << (i > 0 ? ", " : "") << "{\"name\": \"" << joint.name << "\", \"lower\": " << joint.lower
+              << ", \"upper\": " << joint.upper << ", \"max_velocity\": " << joint.max_velocity
+              << ", \"max_torque\": " << joint.max_torque << ", \"nominal\": " << robot.nominal_joint_position[i] << "}";
+  }
+  stance::rigid_body::State state;
+  state.q = robot.nominal_joint_position;
+  stance::rigid_body::Kinematics kinematics;
+  stance::rigid_body::forward_kinematics(model, state, kinematics);
+  std::cout << "], \"feet\": [";
+  for (std::size_t i = 0; i < robot.feet.size(); ++i) {
+    const auto link = static_cast<std::size_t>(robot.feet[i].body);
+    const stance::Vector3 p_BF = kinematics.p_W[link] + kinematics.R_W[link] * robot.feet[i].tip;
+    std::cout << (i > 0 ? ", " : "") << "{\"link\": \"" << robot.foot_links[i] << "\", \"radius\": "
+              << robot.feet[i].radius << ", \"nominal_p_BF\": [" << p_BF.x() << ", " << p_BF.y() << ", " << p_BF.z()
+              << "]}";
+  }
+  std::cout << "]}\n";
+}
 
 }  // namespace
 
@@ -22,7 +50,7 @@ int main(int argc, char** argv) {
   CLI::App app{"Stance's controller: answers ROBOT_STATE with JOINT_COMMAND over LCM, every 10 ms."};
   app.set_version_flag("--version", STANCE_VERSION);
   std::string robot_name, url = io::kDefaultUrl, engine;
-  bool lockstep = false, real_time = false;
+  bool lockstep = false, real_time = false, describe_only = false;
   int priority = 80, cpu = -1;
   loop::RealTimeConfig config;
   app.add_option("--robot", robot_name, "robots/<robot>")->required();
@@ -35,6 +63,7 @@ int main(int argc, char** argv) {
   app.add_option("--phase", config.phase, "Seconds from a state's stamp to the tick that takes it")
       ->check(CLI::Range(0.0, 0.009))
       ->capture_default_str();
+  app.add_flag("--describe", describe_only, "Print the robot as it was read, as JSON, and end");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -43,6 +72,10 @@ int main(int argc, char** argv) {
 
   try {
     auto robot = config::load_robot(config::share_directory() / "robots", robot_name);
+    if (describe_only) {
+      describe(robot);
+      return 0;
+    }
     if (!engine.empty()) robot.yaml_text = with_engine(robot.yaml_text, engine);
     loop::Ticker ticker(compose(robot));
     std::string options;
