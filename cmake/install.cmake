@@ -1,4 +1,13 @@
-# Install and export: find_package(stance) gives stance::force_qp and its siblings.
+# Install and export: find_package(stance) gives stance::force_qp and its siblings. The simulator is a program, not a library.
 include(CMakePackageConfigHelpers)
+set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/stance")
 get_property(libraries GLOBAL PROPERTY STANCE_LIBRARIES)
+list(REMOVE_ITEM libraries stance_sim)
 install(TARGETS ${libraries} EXPORT stanceTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
+install(EXPORT stanceTargets NAMESPACE stance:: DESTINATION ${package_dir})
+configure_package_config_file(cmake/stanceConfig.cmake.in "${PROJECT_BINARY_DIR}/stanceConfig.cmake" INSTALL_DESTINATION ${package_dir})
+write_basic_package_version_file("${PROJECT_BINARY_DIR}/stanceConfigVersion.cmake" COMPATIBILITY SameMinorVersion)
+install(FILES "${PROJECT_BINARY_DIR}/stanceConfig.cmake" "${PROJECT_BINARY_DIR}/stanceConfigVersion.cmake" DESTINATION ${package_dir})
+install(DIRECTORY controller DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/stance FILES_MATCHING PATTERN "*.hpp")
+install(DIRECTORY robots DESTINATION ${CMAKE_INSTALL_DATADIR}/stance)
+install(DIRECTORY sim/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/stance/sim)
