@@ -2,6 +2,7 @@
 
 #include <cstdio>
 #include <stance_msgs/run_info_t.hpp>
+#include <stdexcept>
 
 namespace stance::io {
 namespace {
@@ -30,8 +31,13 @@ std::vector<std::uint8_t> encode(const RunInfo& info) {
 }
 
 bool decode(Bytes bytes, RunInfo& out) {
+  const auto size = static_cast<int>(bytes.size());
   stance_msgs::run_info_t message;
-  if (message.decode(bytes.data(), 0, static_cast<int>(bytes.size())) < 0) return false;
+  try {
+    if (message.decode(bytes.data(), 0, size) != size) return false;
+  } catch (const std::length_error&) {  // LCM's decoder believes the lengths of strings
+    return false;
+  }
   out = {message.robot, message.options, message.urdf, message.configuration};
   return true;
 }

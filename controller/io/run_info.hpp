@@ -17,7 +17,7 @@ struct RunInfo {
 /// The run_info_t of stance-controller.
 std::vector<std::uint8_t> encode(const RunInfo& info);
 
-/// urdf and configuration of an encoded run_info_t; false where the bytes are none.
+/// What an encoded run_info_t says; false, and `out` left alone, where the bytes are not a whole one.
 [[nodiscard]] bool decode(Bytes bytes, RunInfo& out);
 
 }  // namespace stance::io
