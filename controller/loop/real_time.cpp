@@ -35,10 +35,11 @@ struct Inbox {
 /// The first deadline on the grid of the states' stamps, `phase` after them: the nearest one, which may just have passed.
 /// On our own grid where the stamps are of another clock.
 std::int64_t first_deadline(std::int64_t state_utime, std::int64_t phase_ns) noexcept {
-  constexpr std::int64_t same_clock_ns = 1'000'000'000;
+  constexpr std::int64_t same_clock_us = 1'000'000;
   const std::int64_t now = monotonic_ns();
+  const std::int64_t now_us = now / 1000;
+  if (state_utime > now_us + same_clock_us || state_utime < now_us - same_clock_us) return now;
   const std::int64_t origin = state_utime * 1000 + phase_ns;
-  if (origin > now + same_clock_ns || origin < now - same_clock_ns) return now;
   return origin >= now ? origin : origin + (now - origin + kPeriodNs / 2) / kPeriodNs * kPeriodNs;
 }
 
@@ -91,7 +92,7 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
     clock.start();
     timing.wake_latency_us = static_cast<double>(timing.start_utime) - static_cast<double>(deadline_ns) * 1e-3;
     take_messages();
-    timing.state_age_us = static_cast<double>(timing.start_utime - ticker.state().utime);
+    timing.state_age_us = static_cast<double>(timing.start_utime) - static_cast<double>(ticker.state().utime);
     ticker.tick(periods, clock);
     transport.publish(io::channel::kForcePlan, ticker.plan().bytes());
     transport.publish(io::channel::kJointCommand, ticker.command().bytes());

@@ -12,26 +12,34 @@ std::uint64_t combined(const std::array<std::uint64_t, 3>& hashes) noexcept {
   return value;
 }
 
-constexpr double kPeriodUs = kControlPeriod * 1e6;
+constexpr std::uint64_t kPeriodUs = 10'000;
+static_assert(kPeriodUs * 1e-6 == kControlPeriod);
 
 }  // namespace
 
 int periods_between(std::int64_t utime, std::int64_t next_utime) noexcept {
-  const double periods = std::round(static_cast<double>(next_utime - utime) / kPeriodUs);
+  const double periods = std::round((static_cast<double>(next_utime) - static_cast<double>(utime)) / kPeriodUs);
   return static_cast<int>(std::clamp(periods, 1.0, 1e6));
 }
 
 bool Ticker::offer_state(io::Bytes bytes) noexcept {
   const std::int64_t run_id = input_.state.run_id;
   if (!io::decode(bytes, input_.state)) return false;
-  if (input_.state.run_id != run_id) {
-    // An operator's stop ends with its run.
-    input_.operator_stop = false;
-    consumed_.stop_seq = 0;
-  }
+  if (input_.state.run_id != run_id) start_run();
   consumed_.state_is_new = true;
   state_hash_ = io::hash(bytes);
   return true;
+}
+
+void Ticker::start_run() noexcept {
+  if (user_command_hash_ == 0) {
+    input_.user_command = UserCommand{};
+    consumed_.user_command_seq = 0;
+  }
+  if (stop_hash_ == 0) {
+    input_.operator_stop = false;
+    consumed_.stop_seq = 0;
+  }
 }
 
 bool Ticker::offer_user_command(io::Bytes bytes) noexcept {
@@ -59,7 +67,9 @@ void Ticker::tick(int periods, StageClock& clock) noexcept {
   clock.stamp(Stage::kDecode);
   tick_(input_, clock, output_);
 
-  header_.utime = input_.state.utime + late_periods_ * static_cast<std::int64_t>(kPeriodUs);
+  // A stamp is whatever came: unsigned, so that it may wrap.
+  header_.utime = static_cast<std::int64_t>(static_cast<std::uint64_t>(input_.state.utime) +
+                                            static_cast<std::uint64_t>(late_periods_) * kPeriodUs);
   header_.seq += 1;
   header_.state_seq = input_.state.seq;
   header_.run_id = input_.state.run_id;

@@ -36,6 +36,9 @@ class Ticker {
   const io::Message& trace() const noexcept { return trace_; }
 
  private:
+  /// What earlier ticks consumed ends with their run; what came since may be the new run's, and stays.
+  void start_run() noexcept;
+
   TickFunction tick_;
   TickInput input_;
   TickOutput output_;
