@@ -1,7 +1,8 @@
 #include "controller/compose.hpp"
 
-#include <memory>
 #include <yaml-cpp/yaml.h>
+
+#include <memory>
 
 #include "controller/behaviours/biped_controller.hpp"
 #include "controller/config/biped_config_yaml.hpp"

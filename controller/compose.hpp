@@ -10,7 +10,8 @@ namespace stance {
 /// The controller of `robot`, all memory taken. Throws config::ConfigError.
 loop::TickFunction compose(const config::RobotDescription& robot);
 
-/// `yaml_text` with `controller.force_qp.engine` set to `engine`: what a log must carry when the command line chose another.
+/// `yaml_text` with `controller.force_qp.engine` set to `engine`: what a log must carry when the command line chose
+/// another.
 std::string with_engine(const std::string& yaml_text, const std::string& engine);
 
 }  // namespace stance

@@ -26,7 +26,8 @@ void describe(const stance::config::RobotDescription& robot) {
     const auto& joint = model.joints[static_cast<std::size_t>(i)];
     std::cout << (i > 0 ? ", " : "") << "{\"name\": \"" << joint.name << "\", \"lower\": " << joint.lower
               << ", \"upper\": " << joint.upper << ", \"max_velocity\": " << joint.max_velocity
-              << ", \"max_torque\": " << joint.max_torque << ", \"nominal\": " << robot.nominal_joint_position[i] << "}";
+              << ", \"max_torque\": " << joint.max_torque << ", \"nominal\": " << robot.nominal_joint_position[i]
+              << "}";
   }
   stance::rigid_body::State state;
   state.q = robot.nominal_joint_position;
@@ -36,9 +37,9 @@ void describe(const stance::config::RobotDescription& robot) {
   for (std::size_t i = 0; i < robot.feet.size(); ++i) {
     const auto link = static_cast<std::size_t>(robot.feet[i].body);
     const stance::Vector3 p_BF = kinematics.p_W[link] + kinematics.R_W[link] * robot.feet[i].tip;
-    std::cout << (i > 0 ? ", " : "") << "{\"link\": \"" << robot.foot_links[i] << "\", \"radius\": "
-              << robot.feet[i].radius << ", \"nominal_p_BF\": [" << p_BF.x() << ", " << p_BF.y() << ", " << p_BF.z()
-              << "]}";
+    std::cout << (i > 0 ? ", " : "") << "{\"link\": \"" << robot.foot_links[i]
+              << "\", \"radius\": " << robot.feet[i].radius << ", \"nominal_p_BF\": [" << p_BF.x() << ", " << p_BF.y()
+              << ", " << p_BF.z() << "]}";
   }
   std::cout << "]}\n";
 }
@@ -56,7 +57,8 @@ int main(int argc, char** argv) {
   app.add_option("--robot", robot_name, "robots/<robot>")->required();
   auto* lockstep_flag = app.add_flag("--lockstep", lockstep, "Answer each state once, as fast as they come");
   app.add_flag("--realtime", real_time, "Tick on absolute deadlines (default)")->excludes(lockstep_flag);
-  app.add_option("--solver", engine, "Engine of the force QP in place of the robot's own: osqp-condensed or osqp-sparse");
+  app.add_option("--solver", engine,
+                 "Engine of the force QP in place of the robot's own: osqp-condensed or osqp-sparse");
   app.add_option("--lcm-url", url, "LCM's network")->capture_default_str();
   app.add_option("--priority", priority, "SCHED_FIFO priority")->check(CLI::Range(1, 99))->capture_default_str();
   app.add_option("--cpu", cpu, "Core to pin to");

@@ -1,4 +1,5 @@
-// stance-replay: feeds a log's states and commands through the controller that the log itself describes, and compares every byte.
+// stance-replay: feeds a log's states and commands through the controller that the log itself describes, and compares
+// every byte.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdint>
@@ -21,9 +22,9 @@ struct Recording {
   io::RunInfo info;
   bool has_info = false;
   std::map<std::int64_t, io::TraceKey> ticks;
-  std::map<std::int64_t, Payload> traces, commands, plans;                 // by tick
-  std::map<std::pair<std::int64_t, std::int64_t>, Payload> states;         // by run and seq
-  std::map<std::int64_t, Payload> user_commands, stops;                    // by seq
+  std::map<std::int64_t, Payload> traces, commands, plans;          // by tick
+  std::map<std::pair<std::int64_t, std::int64_t>, Payload> states;  // by run and seq
+  std::map<std::int64_t, Payload> user_commands, stops;             // by seq
 };
 
 template <typename Message, typename Map>
@@ -61,10 +62,10 @@ Recording read(const std::string& file) {
 
 struct Outcome {
   std::int64_t ticks = 0;
-  std::int64_t messages = 0;       ///< compared
+  std::int64_t messages = 0;  ///< compared
   std::int64_t differing = 0;
   std::int64_t first_differing = 0;  ///< tick, 0 for none
-  std::string incomplete;          ///< why the replay ended early, empty where it did not
+  std::string incomplete;            ///< why the replay ended early, empty where it did not
 };
 
 Outcome verify(const Recording& recording) {
@@ -122,7 +123,8 @@ Outcome verify(const Recording& recording) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app{"Replays a log through the controller and compares every joint command, force plan and trace, byte for byte."};
+  CLI::App app{
+      "Replays a log through the controller and compares every joint command, force plan and trace, byte for byte."};
   app.set_version_flag("--version", STANCE_VERSION);
   std::string file;
   app.add_option("LOG", file, "An LCM log of stance-controller's run")->required()->check(CLI::ExistingFile);
@@ -134,7 +136,8 @@ int main(int argc, char** argv) {
   try {
     const Recording recording = read(file);
     if (!recording.has_info || recording.ticks.empty()) {
-      std::cerr << "stance-replay: " << file << " holds no run of stance-controller (RUN_INFO_CONTROLLER and CONTROLLER_TRACE)\n";
+      std::cerr << "stance-replay: " << file
+                << " holds no run of stance-controller (RUN_INFO_CONTROLLER and CONTROLLER_TRACE)\n";
       return 3;
     }
     const Outcome outcome = verify(recording);

@@ -1,5 +1,5 @@
-// stance-rollout: simulator and controller in one process, without sockets, as fast as the machine allows. The same messages, in the
-// same order, as over LCM in lockstep: the same results, bit for bit.
+// stance-rollout: simulator and controller in one process, without sockets, as fast as the machine allows. The same
+// messages, in the same order, as over LCM in lockstep: the same results, bit for bit.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -40,10 +40,10 @@ Lcm decoded(io::Bytes bytes) {
 
 /// What a rollout tells on stdout.
 struct Summary {
-  double duration = 0.0;        ///< s, simulated
-  double wall = 0.0;            ///< s
+  double duration = 0.0;  ///< s, simulated
+  double wall = 0.0;      ///< s
   bool fallen = false;
-  double max_tilt = 0.0;        ///< rad, of the trunk
+  double max_tilt = 0.0;  ///< rad, of the trunk
   std::int64_t qp_failures = 0;
   std::uint64_t command_hash = io::kHashSeed;  ///< of every JOINT_COMMAND
 };
@@ -54,8 +54,8 @@ void print(const Summary& s, const sim::Simulator& simulator, bool json) {
   if (json) {
     std::cout << "{\"duration_s\": " << s.duration << ", \"wall_s\": " << s.wall << ", \"times_real_time\": " << speed
               << ", \"fallen\": " << (s.fallen ? "true" : "false") << ", \"max_tilt_rad\": " << s.max_tilt
-              << ", \"qp_failures\": " << s.qp_failures << ", \"p_WB\": [" << truth.p_WB[0] << ", " << truth.p_WB[1] << ", "
-              << truth.p_WB[2] << "], \"command_hash\": \"" << std::hex << s.command_hash << "\"}\n";
+              << ", \"qp_failures\": " << s.qp_failures << ", \"p_WB\": [" << truth.p_WB[0] << ", " << truth.p_WB[1]
+              << ", " << truth.p_WB[2] << "], \"command_hash\": \"" << std::hex << s.command_hash << "\"}\n";
     return;
   }
   std::cout << (s.fallen ? "fell at " : "stood for ") << s.duration << " s; largest tilt of the trunk "
@@ -97,7 +97,8 @@ int main(int argc, char** argv) {
     options.run_id = run_id;
     if (!plant_name.empty()) {
       options.plant = sim::plant_from_name(plant_name);
-      if (!options.plant) throw std::invalid_argument("--plant is '" + plant_name + "', but must be multibody or single-body");
+      if (!options.plant)
+        throw std::invalid_argument("--plant is '" + plant_name + "', but must be multibody or single-body");
     }
     sim::Simulator simulator(robot, scenario, options);
     loop::Ticker ticker(compose(robot));
@@ -116,7 +117,8 @@ int main(int argc, char** argv) {
     Encoded<stance_msgs::truth_t> truth;
     loop::NoClock clock;
     Summary summary;
-    const auto periods = static_cast<std::int64_t>(std::llround((duration > 0.0 ? duration : scenario.duration) / kControlPeriod));
+    const auto periods =
+        static_cast<std::int64_t>(std::llround((duration > 0.0 ? duration : scenario.duration) / kControlPeriod));
     const auto start = std::chrono::steady_clock::now();
     for (std::int64_t k = 0; k < periods && !simulator.fallen(); ++k) {
       if (const auto* command = simulator.user_command()) {
@@ -137,7 +139,8 @@ int main(int argc, char** argv) {
       if (log) record("TRUTH", truth(simulator.truth()));
 
       const auto& q = simulator.truth().quat_WB;
-      summary.max_tilt = std::max(summary.max_tilt, std::acos(std::clamp(1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]), -1.0, 1.0)));
+      summary.max_tilt =
+          std::max(summary.max_tilt, std::acos(std::clamp(1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]), -1.0, 1.0)));
       summary.command_hash = io::hash(ticker.command().bytes(), summary.command_hash);
     }
     summary.wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();

@@ -63,7 +63,8 @@ int main(int argc, char** argv) {
   app.add_option("--seed", options.seed, "Of the sensors' noise")->capture_default_str();
   app.add_option("--plant", plant_name, "multibody or single-body, in place of the scenario's")
       ->check(CLI::IsMember({"multibody", "single-body"}));
-  app.add_option("--run-id", options.run_id, "Stands in every message (default: the time of day)");
+  auto* run_id =
+      app.add_option("--run-id", options.run_id, "Stands in every message (default: the time of day; 1 in lockstep)");
   app.add_option("--lcm-url", url, "LCM's network")->capture_default_str();
   app.add_option("--priority", priority, "SCHED_FIFO priority")->check(CLI::Range(1, 99))->capture_default_str();
   app.add_option("--cpu", cpu, "Core to pin to");
@@ -72,6 +73,8 @@ int main(int argc, char** argv) {
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
+
+  if (lockstep && run_id->count() == 0) options.run_id = 1;  // the same bits each time
 
   try {
     const auto robot = config::load_robot(config::share_directory() / "robots", robot_name);

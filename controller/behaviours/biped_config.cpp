@@ -8,7 +8,8 @@ namespace stance::behaviours {
 namespace {
 
 void require(bool good, const char* field, double value, const char* range) {
-  if (!good) throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) + ", but must be " + range);
+  if (!good)
+    throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) + ", but must be " + range);
 }
 
 }  // namespace
@@ -35,7 +36,7 @@ void BipedConfig::validate() const {
   require(com_offset_quiet_momentum > 0.0, "com_offset_observer.quiet_momentum", com_offset_quiet_momentum, "> 0");
   require(fall.min_upright > 0.0 && fall.min_upright < 1.0, "safety.min_upright", fall.min_upright, "in 0..1");
   require(fall.min_height > 0.0, "safety.min_height", fall.min_height, "> 0 m");
-  require(damping >= 0.0, "safety.damping", damping, ">= 0");
+  require(damping.minCoeff() >= 0.0, "drives.damping's least", damping.minCoeff(), ">= 0");
 }
 
 }  // namespace stance::behaviours

@@ -15,11 +15,11 @@ struct ForceLimits {
 };
 
 struct StandConfig {
-  int stages = 1;                                                     ///< N, of kControlPeriod each
-  CentroidalState state_weights = CentroidalState::Zero();            ///< Q's diagonal
-  double force_weight = 0.0;                                          ///< R's diagonal
-  double height_integral_gain = 0.0;                                  ///< 1/s
-  double height_integral_limit = 0.0;                                 ///< m
+  int stages = 1;                                           ///< N, of kControlPeriod each
+  CentroidalState state_weights = CentroidalState::Zero();  ///< Q's diagonal
+  double force_weight = 0.0;                                ///< R's diagonal
+  double height_integral_gain = 0.0;                        ///< 1/s
+  double height_integral_limit = 0.0;                       ///< m
 };
 
 struct TorqueMapConfig {
@@ -45,7 +45,7 @@ struct BipedConfig {
   safety::FaultLadderConfig fault_ladder;
   safety::ValidationConfig validation;
   FallConfig fall;
-  double damping = 0.0;  ///< N m s/rad, of the joints while damped
+  JointVector damping = JointVector::Zero();  ///< N m s/rad, of the joints while damped
 
   /// Throws std::invalid_argument naming the field, its value and the allowed range.
   void validate() const;

@@ -14,9 +14,9 @@ std::array<rigid_body::Foot, 2> two_feet(const std::vector<rigid_body::Foot>& fe
 
 /// The nominal posture, trunk upright: what standing is designed about.
 struct Nominal {
-  double height = 0.0;              ///< m, C over the ground
-  std::array<Vector3, 2> r;         ///< m, from C to the ground points
-  Matrix3 inertia;                  ///< kg m^2, I_eff, diagonal
+  double height = 0.0;       ///< m, C over the ground
+  std::array<Vector3, 2> r;  ///< m, from C to the ground points
+  Matrix3 inertia;           ///< kg m^2, I_eff, diagonal
 };
 
 Nominal nominal_posture(const rigid_body::Model& model, const std::array<rigid_body::Foot, 2>& feet,
@@ -65,12 +65,15 @@ BipedController::BipedController(const BipedConfig& config, const rigid_body::Mo
         const Nominal nominal = nominal_posture(model_, feet_, nominal_joint_position);
         return Stand(config.stand, config.force_limits, config.force_qp, model_.total_mass, nominal.inertia, nominal.r,
                      nominal.height);
-      }()) {}
+      }()) {
+  start_run(0);
+}
 
 void BipedController::start_run(std::int64_t run_id) noexcept {
   memory_ = Memory{};
   memory_.run_id = run_id;
-  memory_.last.command.num_joints = model_.num_joints;
+  // Nothing to hold before the first plan.
+  override_command(SafetyMode::kDamp, memory_.last.command);
   ladder_ = safety::FaultLadder(config_.fault_ladder);
   estimator_ = fresh_estimator_;
   observer_ = fresh_observer_;
@@ -111,7 +114,7 @@ void BipedController::step(const TickInput& input, StageClock& clock, TickOutput
 
 bool BipedController::accept(const TickInput& input) noexcept {
   const RobotState& state = input.state;
-  if (state.run_id != memory_.run_id) start_run(state.run_id);
+  if (starts_run(memory_.run_id, memory_.state_seq, state)) start_run(state.run_id);
   if (input.operator_stop) ladder_.report(Fault::kOperatorStop);
 
   const UserCommand& command = input.user_command;
@@ -172,8 +175,8 @@ void BipedController::plan(int periods, Trace& trace) noexcept {
   seen.p_WF = {base.p_WF[0], base.p_WF[1]};
   seen.yaw = memory_.yaw;
   // A push turns the robot about its feet as an offset would: look only while the robot is quiet.
-  seen.standing = base.contact[0] && base.contact[1] &&
-                  body_.centroidal.L_C_W.head<2>().norm() < config_.com_offset_quiet_momentum;
+  seen.standing =
+      base.contact[0] && base.contact[1] && body_.centroidal.L_C_W.head<2>().norm() < config_.com_offset_quiet_momentum;
   where.p_WC = seen.p_WC + observer_.step(seen, kControlPeriod * periods);
   where.height_offset = memory_.user_command.height_offset;
   where.periods = periods;
@@ -194,7 +197,7 @@ void BipedController::override_command(SafetyMode mode, JointCommand& command) c
   command = JointCommand{};
   command.num_joints = model_.num_joints;
   command.mode = mode == SafetyMode::kDamp ? DriveMode::kDamp : DriveMode::kStop;
-  if (mode == SafetyMode::kDamp) command.kd.head(model_.num_joints).setConstant(config_.damping);
+  if (mode == SafetyMode::kDamp) command.kd = config_.damping;
 }
 
 }  // namespace stance::behaviours

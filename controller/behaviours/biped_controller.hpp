@@ -19,7 +19,8 @@ class BipedController {
   BipedController(const BipedController&) = delete;  // the torque map refers to the model
   BipedController& operator=(const BipedController&) = delete;
 
-  /// One tick. The same inputs since construction give the same outputs, bit for bit. A state of another run starts afresh.
+  /// One tick. The same inputs since construction give the same outputs, bit for bit. A state of another run starts
+  /// afresh.
   void step(const TickInput& input, StageClock& clock, TickOutput& out) noexcept;
 
  private:
@@ -28,12 +29,12 @@ class BipedController {
   /// What a run has made of the controller so far: a new run starts with a new one.
   struct Memory {
     std::int64_t run_id = 0;
-    std::int64_t state_seq = 0;      ///< last state acted on
-    std::int64_t state_utime = -1;   ///< us
-    UserCommand user_command;        ///< last plausible one
-    double yaw = 0.0;                ///< rad, unwrapped
+    std::int64_t state_seq = 0;     ///< last state acted on
+    std::int64_t state_utime = -1;  ///< us
+    UserCommand user_command;       ///< last plausible one
+    double yaw = 0.0;               ///< rad, unwrapped
     bool standing = false;
-    TickOutput last;                 ///< what HOLD repeats
+    TickOutput last;  ///< what HOLD repeats
   };
 
   void start_run(std::int64_t run_id) noexcept;
@@ -47,7 +48,7 @@ class BipedController {
   rigid_body::Model model_;
   std::array<rigid_body::Foot, kFeet> feet_;
   std::array<kinematics::LegGeometry, kFeet> legs_;
-  estimation::BaseEstimator fresh_estimator_;   ///< as constructed, for a new run
+  estimation::BaseEstimator fresh_estimator_;  ///< as constructed, for a new run
   estimation::CentreOfMassOffsetObserver fresh_observer_;
 
   Memory memory_;

@@ -47,8 +47,7 @@ Stand::Stand(const StandConfig& config, const ForceLimits& limits, const force_q
   centroidal::Dynamics dynamics;
   centroidal::dynamics(parameters_, nominal, dynamics);
   problem_.has_terminal_cost = true;
-  problem_.terminal_cost =
-      centroidal::riccati_terminal_cost(dynamics, config.state_weights, problem_.stages.front().R);
+  problem_.terminal_cost = centroidal::riccati_terminal_cost(dynamics, config.state_weights, problem_.stages.front().R);
 }
 
 void Stand::enter() noexcept {

@@ -1,8 +1,9 @@
 #pragma once
 // Standing on two point feet: the reference, and the force QP that keeps it.
 //
-// The QP is written in the heading frame H of the stand, square to the line through the feet (yaw_ref): theta = (roll, pitch, yaw - yaw_ref), the rest
-// of x and the forces turned by Rz(yaw_ref)^T. There the model is time-invariant, with three things that standing needs:
+// The QP is written in the heading frame H of the stand, square to the line through the feet (yaw_ref): theta = (roll,
+// pitch, yaw - yaw_ref), the rest of x and the forces turned by Rz(yaw_ref)^T. There the model is time-invariant, with
+// three things that standing needs:
 //   the coupling term (p against the force reference m g, see centroidal.hpp),
 //   the inertia I_eff = d L_C / d omega_trunk with the feet held, and omega := I_eff^-1 L_C,
 //   the terminal cost P of the discrete Riccati equation.
@@ -15,13 +16,13 @@ namespace stance::behaviours {
 
 /// Where the robot is, as standing sees it.
 struct StandInput {
-  Vector3 rpy = Vector3::Zero();     ///< rad, yaw unwrapped
-  Vector3 p_WC = Vector3::Zero();    ///< m, corrected by the offset observer
-  Vector3 v_WC = Vector3::Zero();    ///< m/s
-  Vector3 L_C_W = Vector3::Zero();   ///< kg m^2/s
+  Vector3 rpy = Vector3::Zero();                 ///< rad, yaw unwrapped
+  Vector3 p_WC = Vector3::Zero();                ///< m, corrected by the offset observer
+  Vector3 v_WC = Vector3::Zero();                ///< m/s
+  Vector3 L_C_W = Vector3::Zero();               ///< kg m^2/s
   ContactVectors p_WG = zero_contact_vectors();  ///< m, ground points of the feet
-  double height_offset = 0.0;        ///< m, wanted
-  int periods = 1;                   ///< control periods since the last call
+  double height_offset = 0.0;                    ///< m, wanted
+  int periods = 1;                               ///< control periods since the last call
 };
 
 struct StandOutput {

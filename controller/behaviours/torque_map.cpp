@@ -10,8 +10,7 @@ constexpr double kMinNullSum = 1e-2;  // below it the last link's angle cannot b
 }  // namespace
 
 TorqueMap::TorqueMap(const TorqueMapConfig& config, double last_link_pitch, const rigid_body::Model& model,
-                     const std::array<rigid_body::Foot, 2>& feet,
-                     const std::array<kinematics::LegGeometry, 2>& legs)
+                     const std::array<rigid_body::Foot, 2>& feet, const std::array<kinematics::LegGeometry, 2>& legs)
     : config_(config), last_link_pitch_(last_link_pitch), model_(model), feet_(feet), legs_(legs) {}
 
 void TorqueMap::stance(const BodyDynamics& body, const ContactVectors& force_W, JointCommand& command) const noexcept {

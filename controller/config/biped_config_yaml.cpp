@@ -84,7 +84,6 @@ behaviours::TorqueMapConfig torque_map(StrictYaml yaml) {
 void safety(StrictYaml yaml, behaviours::BipedConfig& c) {
   c.fault_ladder.hold_time = yaml.number("hold_time");
   c.fault_ladder.damp_time = yaml.number("damp_time");
-  c.damping = yaml.number("damping");
   c.fall.min_upright = yaml.number("min_upright");
   c.fall.min_height = yaml.number("min_height");
   c.validation.max_angular_velocity = yaml.number("max_angular_velocity");
@@ -108,6 +107,8 @@ behaviours::BipedConfig biped_config_from_yaml(const std::string& yaml_text) {
   c.torque_map = torque_map(yaml.mapping("torque_map"));
   safety(yaml.mapping("safety"), c);
   yaml.finish();
+  const auto damping = root.mapping("drives").numbers("damping", kMaxJoints);
+  c.damping = Eigen::Map<const JointVector>(damping.data());
   try {
     c.validate();
   } catch (const std::invalid_argument& error) {

@@ -13,8 +13,8 @@ struct RobotDescription {
   std::string name;
   std::string urdf_text;
   std::string yaml_text;
-  std::vector<std::string> joint_names;   ///< the order of every joint vector
-  std::vector<std::string> foot_links;    ///< left first
+  std::vector<std::string> joint_names;  ///< the order of every joint vector
+  std::vector<std::string> foot_links;   ///< left first
   rigid_body::Model model;
   std::vector<rigid_body::Foot> feet;
   JointVector nominal_joint_position = JointVector::Zero();  ///< rad
@@ -26,10 +26,12 @@ std::string read_text(const std::filesystem::path& file);
 /// robots/<robot>/<robot>.yaml and the URDF that it names. Throws ConfigError.
 RobotDescription load_robot(const std::filesystem::path& robots_directory, const std::string& robot);
 
-/// The same from texts, as a log holds them. The `controller` section is left to controller_config.hpp. Throws ConfigError.
+/// The same from texts, as a log holds them. The `controller` section is left to controller_config.hpp. Throws
+/// ConfigError.
 RobotDescription robot_from_texts(const std::string& yaml_text, const std::string& urdf_text);
 
-/// Where robots/ and sim/scenarios/ are: $STANCE_SHARE, else the source tree that this was built from, else the installed share.
+/// Where robots/ and sim/scenarios/ are: $STANCE_SHARE, else the source tree that this was built from, else the
+/// installed share.
 std::filesystem::path share_directory();
 
 }  // namespace stance::config

@@ -1,10 +1,10 @@
 #pragma once
 // YAML in which every key is asked for and no other key may stand: a typing error is an error, not a default.
+#include <yaml-cpp/yaml.h>
+
 #include <stdexcept>
 #include <string>
 #include <vector>
-
-#include <yaml-cpp/yaml.h>
 
 namespace stance::config {
 
@@ -14,11 +14,12 @@ class ConfigError : public std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
-/// One mapping of a YAML document. Keys are required unless read with `optional`; `finish()` refuses the keys that nobody read.
+/// One mapping of a YAML document. Keys are required unless read with `optional`; `finish()` refuses the keys that
+/// nobody read.
 class StrictYaml {
  public:
-  /// Parses `text`; `name` stands in messages (a file's name). Throws ConfigError where it is no YAML mapping, or a key stands
-  /// twice in one mapping.
+  /// Parses `text`; `name` stands in messages (a file's name). Throws ConfigError where it is no YAML mapping, or a key
+  /// stands twice in one mapping.
   static StrictYaml parse(const std::string& text, const std::string& name);
 
   bool has(const std::string& key) const;

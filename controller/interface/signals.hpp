@@ -1,10 +1,9 @@
 #pragma once
 // The plain structs that cross the controller's edge, one for each message of lcmtypes/: same fields, frames and units.
 // Fixed sizes, so that nothing allocates; `num_joints` and `num_contacts` say how much is in use.
+#include <Eigen/Core>
 #include <array>
 #include <cstdint>
-
-#include <Eigen/Core>
 
 #include "controller/math/so3.hpp"
 
@@ -12,8 +11,8 @@ namespace stance {
 
 inline constexpr int kMaxJoints = 8;
 inline constexpr int kMaxContacts = 4;
-inline constexpr int kStateSamples = 2;     ///< sensor samples in one RobotState
-inline constexpr int kMaxPlanStages = 32;   ///< published stages of a force plan
+inline constexpr int kStateSamples = 2;         ///< sensor samples in one RobotState
+inline constexpr int kMaxPlanStages = 32;       ///< published stages of a force plan
 inline constexpr double kControlPeriod = 0.01;  ///< s, dt of the loop and of the centroidal model
 
 using JointVector = Eigen::Matrix<double, kMaxJoints, 1>;  ///< entries past num_joints are zero
@@ -29,8 +28,8 @@ inline ContactVectors zero_contact_vectors() {
 
 /// What the sensors say over one part of a control period.
 struct SensorSample {
-  Vector3 gyro = Vector3::Zero();           ///< rad/s, in B, mean over the sample
-  Vector3 accelerometer = Vector3::Zero();  ///< m/s^2, specific force at B's origin in B, mean over the sample
+  Vector3 gyro = Vector3::Zero();                    ///< rad/s, in B, mean over the sample
+  Vector3 accelerometer = Vector3::Zero();           ///< m/s^2, specific force at B's origin in B, mean over the sample
   JointVector joint_position = JointVector::Zero();  ///< rad, at the sample's end
   JointVector joint_velocity = JointVector::Zero();  ///< rad/s, mean over the sample
   std::array<bool, kMaxContacts> contact_switch{};   ///< at the sample's end
@@ -42,12 +41,17 @@ struct RobotState {
   std::int64_t run_id = 0;
   int num_joints = 0;
   int num_contacts = 0;
-  double sample_period = 0.0;  ///< s
+  double sample_period = 0.0;                         ///< s
   std::array<SensorSample, kStateSamples> samples{};  ///< oldest first
   JointVector joint_torque = JointVector::Zero();     ///< N m, mean over the period
 
   const SensorSample& now() const { return samples.back(); }
 };
+
+/// Is `state` of another run than the one before it, of `run_id` and `seq`? A sender that starts again counts from 1.
+inline bool starts_run(std::int64_t run_id, std::int64_t seq, const RobotState& state) {
+  return state.run_id != run_id || (state.seq == 1 && seq > 1);
+}
 
 enum class Behaviour : std::int8_t { kStand = 0, kWalk = 1, kLieDown = 2, kTrack = 3, kCatch = 4 };
 
@@ -73,17 +77,16 @@ struct JointCommand {
   JointVector kd = JointVector::Zero();                  ///< N m s/rad
 };
 
-
 /// The forces of the QP and the path that they are predicted to give.
 struct ForcePlan {
   int num_contacts = 0;
   int num_stages = 0;
-  std::array<double, kMaxPlanStages> stage_duration{};           ///< s
+  std::array<double, kMaxPlanStages> stage_duration{};  ///< s
   std::array<ContactFlags, kMaxPlanStages> contact{};
-  ContactVectors p_WF = zero_contact_vectors();                  ///< m, where the forces of stage 0 act
-  std::array<ContactVectors, kMaxPlanStages> force;              ///< N, of the ground on the robot, in W
-  std::array<Vector3, kMaxPlanStages> p_WC;                      ///< m, predicted, at each stage's end
-  double effort = 0.0;                                           ///< ||f||_R of stage 0
+  ContactVectors p_WF = zero_contact_vectors();      ///< m, where the forces of stage 0 act
+  std::array<ContactVectors, kMaxPlanStages> force;  ///< N, of the ground on the robot, in W
+  std::array<Vector3, kMaxPlanStages> p_WC;          ///< m, predicted, at each stage's end
+  double effort = 0.0;                               ///< ||f||_R of stage 0
 
   ForcePlan() {
     force.fill(zero_contact_vectors());
@@ -130,8 +133,8 @@ struct BaseEstimate {
   Vector3 sigma_v = Vector3::Zero();
   Vector3 sigma_theta = Vector3::Zero();
   ContactVectors p_WF = zero_contact_vectors();  ///< foot tips
-  ContactFlags contact{};   ///< believed to bear load
-  double nis = 0.0;         ///< per degree of freedom, mean over the last step's updates
+  ContactFlags contact{};                        ///< believed to bear load
+  double nis = 0.0;                              ///< per degree of freedom, mean over the last step's updates
 };
 
 /// All that a tick decided; what it consumed stands beside it (loop/).
@@ -155,11 +158,11 @@ struct Trace {
 
 /// What a tick is given. Everything that a decision may depend on is here, so that a log of it replays bit for bit.
 struct TickInput {
-  RobotState state;             ///< the newest, as it came: not yet validated
-  bool state_is_new = false;    ///< not given to an earlier tick
-  int periods = 1;              ///< control periods since the last tick: more than 1 after a miss
-  UserCommand user_command;     ///< the newest, as it came; seq 0 before the first
-  bool operator_stop = false;   ///< a stop_t has arrived in this run
+  RobotState state;            ///< the newest, as it came: not yet validated
+  bool state_is_new = false;   ///< not given to an earlier tick
+  int periods = 1;             ///< control periods since the last tick: more than 1 after a miss
+  UserCommand user_command;    ///< the newest, as it came; seq 0 before the first
+  bool operator_stop = false;  ///< a stop_t has arrived in this run
 };
 
 struct TickOutput {

@@ -24,7 +24,7 @@ class LogWriter {
 struct LogEvent {
   std::int64_t utime = 0;  ///< us
   std::string channel;
-  Bytes bytes;             ///< valid until the next event is read
+  Bytes bytes;  ///< valid until the next event is read
 };
 
 class LogReader {

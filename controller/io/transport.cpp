@@ -9,8 +9,8 @@ namespace stance::io {
 struct Transport::Impl {
   struct Subscription {
     std::function<void(Bytes)> handler;
-    void receive(const lcm::ReceiveBuffer* buffer, const std::string& /*channel*/) {
-      handler({static_cast<const std::uint8_t*>(buffer->data), buffer->data_size});
+    static void receive(const lcm::ReceiveBuffer* buffer, const std::string& /*channel*/, Subscription* self) {
+      self->handler({static_cast<const std::uint8_t*>(buffer->data), buffer->data_size});
     }
   };
   explicit Impl(const std::string& url) : lcm(url) {}
@@ -21,8 +21,9 @@ struct Transport::Impl {
 
 Transport::Transport(const std::string& url) : impl_(std::make_unique<Impl>(url)) {
   if (!impl_->lcm.good()) {
-    throw std::runtime_error("LCM cannot use " + url +
-                             ": is there a multicast route? `stance run` makes one, or: ip route add 224.0.0.0/4 dev lo");
+    throw std::runtime_error(
+        "LCM cannot use " + url +
+        ": is there a multicast route? `stance run` makes one, or: ip route add 224.0.0.0/4 dev lo");
   }
 }
 
@@ -31,7 +32,7 @@ Transport::~Transport() = default;
 void Transport::subscribe(const char* channel, std::function<void(Bytes)> handler) {
   auto& subscription = impl_->subscriptions.emplace_back(std::make_unique<Impl::Subscription>());
   subscription->handler = std::move(handler);
-  impl_->lcm.subscribe(channel, &Impl::Subscription::receive, subscription.get());
+  impl_->lcm.subscribeFunction(channel, &Impl::Subscription::receive, subscription.get());
 }
 
 bool Transport::handle(int timeout_ms) { return impl_->lcm.handleTimeout(timeout_ms) > 0; }

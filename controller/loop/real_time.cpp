@@ -32,8 +32,8 @@ struct Inbox {
   }
 };
 
-/// The first deadline on the grid of the states' stamps, `phase` after them: the nearest one, which may just have passed.
-/// On our own grid where the stamps are of another clock.
+/// The first deadline on the grid of the states' stamps, `phase` after them: the nearest one, which may just have
+/// passed. On our own grid where the stamps are of another clock.
 std::int64_t first_deadline(std::int64_t state_utime, std::int64_t phase_ns) noexcept {
   constexpr std::int64_t same_clock_us = 1'000'000;
   const std::int64_t now = monotonic_ns();
@@ -65,7 +65,8 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
   });
 
   const auto take_messages = [&] {
-    if (const io::Message* bytes = inbox.user_command.take()) static_cast<void>(ticker.offer_user_command(bytes->bytes()));
+    if (const io::Message* bytes = inbox.user_command.take())
+      static_cast<void>(ticker.offer_user_command(bytes->bytes()));
     if (const io::Message* bytes = inbox.stop.take()) static_cast<void>(ticker.offer_stop(bytes->bytes()));
     if (const io::Message* bytes = inbox.state.take()) static_cast<void>(ticker.offer_state(bytes->bytes()));
   };

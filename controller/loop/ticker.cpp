@@ -23,9 +23,9 @@ int periods_between(std::int64_t utime, std::int64_t next_utime) noexcept {
 }
 
 bool Ticker::offer_state(io::Bytes bytes) noexcept {
-  const std::int64_t run_id = input_.state.run_id;
+  const std::int64_t run_id = input_.state.run_id, seq = input_.state.seq;
   if (!io::decode(bytes, input_.state)) return false;
-  if (input_.state.run_id != run_id) start_run();
+  if (starts_run(run_id, seq, input_.state)) start_run();
   consumed_.state_is_new = true;
   state_hash_ = io::hash(bytes);
   return true;

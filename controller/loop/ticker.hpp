@@ -1,6 +1,6 @@
 #pragma once
-// One tick of any robot, from the newest messages' bytes to the bytes to publish. The real-time loop, the lockstep loop, the
-// rollout and the replay all run this, so that the same inputs give the same bits.
+// One tick of any robot, from the newest messages' bytes to the bytes to publish. The real-time loop, the lockstep
+// loop, the rollout and the replay all run this, so that the same inputs give the same bits.
 #include <functional>
 
 #include "controller/io/codec.hpp"

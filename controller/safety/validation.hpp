@@ -23,7 +23,8 @@ bool command_is_plausible(const UserCommand& command) noexcept;
 /// Does any joint stand outside its limits by more than 1e-3 rad?
 bool joint_outside_limits(const rigid_body::Model& model, const JointVector& position) noexcept;
 
-/// Clips feed-forward torques to the joints' limits; returns how many were. A torque that is not finite becomes zero and counts.
+/// Clips feed-forward torques to the joints' limits; returns how many were. A torque that is not finite becomes zero
+/// and counts.
 int limit_torques(const rigid_body::Model& model, JointCommand& command) noexcept;
 
 }  // namespace stance::safety
