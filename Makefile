@@ -46,7 +46,7 @@ bench: build
 
 study: build
 	-.venv/bin/stance study --scenario stand --scales 1.0 1.1
-	-.venv/bin/stance study --scenario stand_noisy --scales 0.6 0.7 0.8 0.9 1.0 --seed 20000
+	-.venv/bin/stance study --scenario stand_noisy --scales 1.0 1.05 1.1 --seed 20000
 
 format:
 	clang-format -i $$(git ls-files '*.cpp' '*.hpp')
