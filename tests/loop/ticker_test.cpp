@@ -157,6 +157,16 @@ TEST_CASE_METHOD(Bench, "AStopAndAUserCommandThatComeBeforeARunsFirstStateAreOfT
   CHECK(trace.stop_seq == 2);
 }
 
+TEST_CASE_METHOD(Bench, "ASenderThatCountsFromOneAgainStartsARunUnderTheSameId") {
+  REQUIRE(ticker.offer_stop(stop(6)));
+  CHECK(tick_with(state(1)).operator_stop);
+  CHECK(tick_with(state(1)).operator_stop);  // a repeated one does not
+  CHECK(tick_with(state(2)).operator_stop);
+  CHECK(tick_with(state(2)).operator_stop);
+  CHECK_FALSE(tick_with(state(1)).operator_stop);
+  CHECK(trace.stop_seq == 0);
+}
+
 TEST_CASE_METHOD(Bench, "BytesThatAreNoMessageAreRefusedAndChangeNothing") {
   Bench undisturbed;
   tick_with(state(1));
