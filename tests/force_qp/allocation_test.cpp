@@ -1,6 +1,5 @@
 // A solve allocates nothing once the engine is set up, whatever its outcome. malloc itself is interposed: OSQP is C,
 // and Eigen's own guard is off in release builds.
-#include <atomic>
 #include <catch2/catch_test_macros.hpp>
 #include <cstddef>
 #include <limits>
@@ -8,51 +7,19 @@
 
 #include "controller/force_qp/force_qp.hpp"
 #include "tests/force_qp/problems.hpp"
-
-namespace {
-std::atomic<long> allocations{0};
-}
-
-// glibc's own entry points, to which the interposed ones pass on.
-extern "C" {
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t count, std::size_t size);
-void* __libc_realloc(void* block, std::size_t size);
-void* __libc_memalign(std::size_t alignment, std::size_t size);
-
-void* malloc(std::size_t size) noexcept {
-  ++allocations;
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t count, std::size_t size) noexcept {
-  ++allocations;
-  return __libc_calloc(count, size);
-}
-void* realloc(void* block, std::size_t size) noexcept {
-  ++allocations;
-  return __libc_realloc(block, size);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
-  ++allocations;
-  return __libc_memalign(alignment, size);
-}
-int posix_memalign(void** block, std::size_t alignment, std::size_t size) noexcept {
-  ++allocations;
-  *block = __libc_memalign(alignment, size);
-  return 0;
-}
-}
+#include "tests/support/heap_calls.hpp"
 
 using namespace stance;
 using namespace stance::force_qp;
 using namespace stance::force_qp::test;
+using stance::test::heap_calls;
 
-TEST_CASE("InterposedMallocSeesAllocations") {
-  const long before = allocations;
+TEST_CASE("HeapCallsAreCounted") {
+  const long before = heap_calls;
   const volatile std::size_t size = 1000;  // so that the compiler cannot do without
   const std::vector<double> block(size);
   CHECK(block.size() == size);
-  CHECK(allocations > before);
+  CHECK(heap_calls > before);
 }
 
 TEST_CASE("ASolveAllocatesNothing") {
@@ -71,11 +38,11 @@ TEST_CASE("ASolveAllocatesNothing") {
       }
       auto engine = make_force_qp(settings, problems.front().sizes, kWeight);
       Solution solution(problems.front().sizes);
-      const long before = allocations;
+      const long before = heap_calls;
       long solved = 0;
       for (const Problem& problem : problems) solved += engine->solve(problem, solution) == QpStatus::kSolved;
       engine->reset();
-      CHECK(allocations == before);
+      CHECK(heap_calls == before);
       CHECK(solved == 28);
     }
   }
@@ -86,9 +53,9 @@ TEST_CASE("AModelAllocatesNothing") {
   const centroidal::Linearisation at = stand_linearisation(4, true);
   centroidal::Dynamics out;
   const centroidal::ForceVector f = centroidal::ForceVector::Ones(12);
-  const long before = allocations;
+  const long before = heap_calls;
   centroidal::dynamics(parameters, at, out);
   const double effort = centroidal::effort(f, f);
-  CHECK(allocations == before);
+  CHECK(heap_calls == before);
   CHECK(effort > 0.0);
 }

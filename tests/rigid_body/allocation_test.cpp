@@ -1,55 +1,21 @@
 // Nothing that a control tick calls allocates. malloc itself is interposed: Eigen's own guard is off in release builds.
-#include <atomic>
 #include <catch2/catch_test_macros.hpp>
 #include <cstddef>
 #include <vector>
 
 #include "tests/rigid_body/biped_fixture.hpp"
-
-namespace {
-std::atomic<long> allocations{0};
-}
-
-// glibc's own entry points, to which the interposed ones pass on.
-extern "C" {
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t count, std::size_t size);
-void* __libc_realloc(void* block, std::size_t size);
-void* __libc_memalign(std::size_t alignment, std::size_t size);
-
-void* malloc(std::size_t size) noexcept {
-  ++allocations;
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t count, std::size_t size) noexcept {
-  ++allocations;
-  return __libc_calloc(count, size);
-}
-void* realloc(void* block, std::size_t size) noexcept {
-  ++allocations;
-  return __libc_realloc(block, size);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
-  ++allocations;
-  return __libc_memalign(alignment, size);
-}
-int posix_memalign(void** block, std::size_t alignment, std::size_t size) noexcept {
-  ++allocations;
-  *block = __libc_memalign(alignment, size);
-  return 0;
-}
-}
+#include "tests/support/heap_calls.hpp"
 
 using namespace stance;
 using namespace stance::test;
 using namespace stance::rigid_body;
 
-TEST_CASE("InterposedMallocSeesAllocations") {
-  const long before = allocations;
+TEST_CASE("HeapCallsAreCounted") {
+  const long before = heap_calls;
   const volatile std::size_t size = 1000;  // so that the compiler cannot do without
   const std::vector<double> block(size);
   CHECK(block.size() == size);
-  CHECK(allocations > before);
+  CHECK(heap_calls > before);
 }
 
 TEST_CASE("KinematicsAndDynamicsDoNotAllocate") {
@@ -59,7 +25,7 @@ TEST_CASE("KinematicsAndDynamicsDoNotAllocate") {
   const VectorNu nud = random_acceleration(biped.model, random);
   const kinematics::LegVector q = state.q.head<4>();
 
-  const long before = allocations;
+  const long before = heap_calls;
   Kinematics kinematics;
   forward_kinematics(biped.model, state, kinematics);
   Jacobian J;
@@ -87,7 +53,7 @@ TEST_CASE("KinematicsAndDynamicsDoNotAllocate") {
   kinematics::LegVector inverse;
   (void)kinematics::leg_ik(biped.legs[0], leg.foot, -0.25, inverse);
   const kinematics::LegVector null = kinematics::null_direction(leg.J_foot);
-  const long after = allocations;
+  const long after = heap_calls;
 
   CHECK(after == before);
   CHECK((momentum.allFinite() && square.allFinite() && null.allFinite()));
