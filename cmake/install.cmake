@@ -10,4 +10,3 @@ write_basic_package_version_file("${PROJECT_BINARY_DIR}/stanceConfigVersion.cmak
 install(FILES "${PROJECT_BINARY_DIR}/stanceConfig.cmake" "${PROJECT_BINARY_DIR}/stanceConfigVersion.cmake" DESTINATION ${package_dir})
 install(DIRECTORY controller DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/stance FILES_MATCHING PATTERN "*.hpp")
 install(DIRECTORY robots DESTINATION ${CMAKE_INSTALL_DATADIR}/stance)
-install(DIRECTORY sim/scenarios DESTINATION ${CMAKE_INSTALL_DATADIR}/stance/sim)

@@ -39,6 +39,7 @@ function(stance_add_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
   add_executable(${name} ${ARG_SOURCES})
   target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} stance_flags)
+  set_target_properties(${name} PROPERTIES INSTALL_RPATH "${STANCE_SITE_PACKAGES}/lib")  # LCM stays in its Python environment
   install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 endfunction()
 

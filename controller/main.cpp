@@ -8,7 +8,7 @@
 #include "controller/compose.hpp"
 #include "controller/io/run_info.hpp"
 #include "controller/loop/loop.hpp"
-#include "controller/loop/real_time_setup.hpp"
+#include "controller/platform/real_time.hpp"
 #include "controller/rigid_body/dynamics.hpp"
 
 namespace {
@@ -90,7 +90,7 @@ int main(int argc, char** argv) {
       io::Transport transport(url);
       loop::run_lockstep(ticker, transport, run_info, stop);
     } else {
-      const std::string refused = loop::enter_real_time(priority, cpu);
+      const std::string refused = platform::enter_real_time(priority, cpu);
       if (!refused.empty()) std::cerr << "stance-controller: without real-time privileges (" << refused << ")\n";
       io::Transport transport(url);
       loop::run_real_time(ticker, transport, run_info, config, stop);

@@ -8,8 +8,8 @@
 #include <iostream>
 #include <string>
 
+#include "controller/platform/real_time.hpp"
 #include "sim/node.hpp"
-#include "sim/real_time.hpp"
 
 namespace {
 
@@ -86,7 +86,7 @@ int main(int argc, char** argv) {
     for (int i = 1; i < argc; ++i) arguments += (i > 1 ? " " : "") + std::string(argv[i]);
 
     if (!lockstep) {
-      const std::string refused = sim::enter_real_time(priority, cpu);
+      const std::string refused = platform::enter_real_time(priority, cpu);
       if (!refused.empty()) std::cerr << "stance-sim: without real-time privileges (" << refused << ")\n";
     }
     lcm::LCM lcm(url);
@@ -100,7 +100,7 @@ int main(int argc, char** argv) {
 
     constexpr std::int64_t settle_ns = 100'000'000;  // from here to the first instant
     constexpr std::int64_t us_ns = 1000;
-    const std::int64_t start_utime = (sim::monotonic_ns() + settle_ns) / us_ns;
+    const std::int64_t start_utime = (platform::monotonic_ns() + settle_ns) / us_ns;
     if (!lockstep) options.start_utime = start_utime;
     sim::Simulator simulator(robot, scenario, options);
     sim::Node node(lcm, simulator, sim::encode_run_info(robot, scenario, options, arguments));

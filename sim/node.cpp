@@ -9,7 +9,7 @@
 #include <string_view>
 #include <utility>
 
-#include "sim/real_time.hpp"
+#include "controller/platform/real_time.hpp"
 
 namespace stance::sim {
 namespace {
@@ -108,7 +108,7 @@ void Node::publish_instant() {
 }
 
 void Node::housekeeping() {
-  const std::int64_t now = monotonic_ns();
+  const std::int64_t now = platform::monotonic_ns();
   if (now >= next_run_info_ns_) {
     lcm_.publish(kRunInfo, run_info_.data(), static_cast<unsigned>(run_info_.size()));
     next_run_info_ns_ = now + kSecondNs;
@@ -124,7 +124,7 @@ void Node::housekeeping() {
 void Node::take_messages_until(std::int64_t deadline_ns, const std::atomic<bool>& stop) {
   pollfd readable{lcm_.getFileno(), POLLIN, 0};
   while (!stop.load(std::memory_order_relaxed)) {
-    const std::int64_t left = std::max<std::int64_t>(deadline_ns - monotonic_ns(), 0);
+    const std::int64_t left = std::max<std::int64_t>(deadline_ns - platform::monotonic_ns(), 0);
     const timespec timeout{left / kSecondNs, left % kSecondNs};
     if (ppoll(&readable, 1, &timeout, nullptr) <= 0) return;  // the deadline, or a signal
     lcm_.handle();
@@ -133,12 +133,12 @@ void Node::take_messages_until(std::int64_t deadline_ns, const std::atomic<bool>
 
 bool Node::wait_for_answer(const LockstepTiming& timing, const std::atomic<bool>& stop) {
   const auto ns = [](double seconds) { return static_cast<std::int64_t>(seconds * 1e9); };
-  const std::int64_t start = monotonic_ns();
+  const std::int64_t start = platform::monotonic_ns();
   const std::int64_t end = start + ns(answered_seq_ == 0 ? timing.first_answer : timing.silence);
   std::int64_t repeat = start + ns(timing.repeat);
   pollfd readable{lcm_.getFileno(), POLLIN, 0};
   while (answered_seq_ < simulator_.state().seq) {
-    const std::int64_t now = monotonic_ns();
+    const std::int64_t now = platform::monotonic_ns();
     if (stop.load(std::memory_order_relaxed) || now >= end) return false;
     if (now >= repeat) {
       publish_state();
@@ -173,12 +173,12 @@ NodeReport Node::run_real_time(std::int64_t periods, std::int64_t start_ns, cons
   housekeeping();
   for (std::int64_t k = 0; k < periods; ++k) {
     const std::int64_t instant = start_ns + k * kPeriodNs;
-    while (!stop.load(std::memory_order_relaxed) && monotonic_ns() < instant) sleep_until(instant);
+    while (!stop.load(std::memory_order_relaxed) && platform::monotonic_ns() < instant) platform::sleep_until(instant);
     if (stop.load(std::memory_order_relaxed)) {
       report_.ending = Ending::kStopped;
       return report_;
     }
-    const std::int64_t lateness = monotonic_ns() - instant;
+    const std::int64_t lateness = platform::monotonic_ns() - instant;
     publish_instant();
     if (lateness > late) ++report_.late_instants;
     report_.worst_lateness = std::max(report_.worst_lateness, static_cast<double>(lateness) * 1e-9);

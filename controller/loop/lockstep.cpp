@@ -43,9 +43,9 @@ void run_lockstep(Ticker& ticker, io::Transport& transport, const std::vector<st
 
   std::int64_t next_info_ns = 0;
   while (!stop.load(std::memory_order_relaxed)) {
-    if (monotonic_ns() >= next_info_ns) {
+    if (platform::monotonic_ns() >= next_info_ns) {
       transport.publish(io::channel::kRunInfo, run_info);
-      next_info_ns = monotonic_ns() + kRunInfoPeriodNs;
+      next_info_ns = platform::monotonic_ns() + kRunInfoPeriodNs;
     }
     transport.handle(100);
   }

@@ -1,4 +1,3 @@
-#include <cerrno>
 #include <thread>
 
 #include "controller/loop/loop.hpp"
@@ -11,12 +10,6 @@ namespace {
 constexpr std::int64_t kPeriodNs = 10'000'000;
 constexpr std::int64_t kRunInfoPeriodNs = 1'000'000'000;
 static_assert(kPeriodNs * 1e-9 == kControlPeriod);
-
-void sleep_until(std::int64_t deadline_ns) noexcept {
-  const timespec deadline{deadline_ns / 1'000'000'000, deadline_ns % 1'000'000'000};
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &deadline, nullptr) == EINTR) {
-  }
-}
 
 /// What the receiving thread leaves for the control thread.
 struct Inbox {
@@ -36,7 +29,7 @@ struct Inbox {
 /// passed. On our own grid where the stamps are of another clock.
 std::int64_t first_deadline(std::int64_t state_utime, std::int64_t phase_ns) noexcept {
   constexpr std::int64_t same_clock_us = 1'000'000;
-  const std::int64_t now = monotonic_ns();
+  const std::int64_t now = platform::monotonic_ns();
   const std::int64_t now_us = now / 1000;
   if (state_utime > now_us + same_clock_us || state_utime < now_us - same_clock_us) return now;
   const std::int64_t origin = state_utime * 1000 + phase_ns;
@@ -56,9 +49,9 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
   std::thread receiver([&] {
     std::int64_t next_info_ns = 0;
     while (!stop.load(std::memory_order_relaxed)) {
-      if (monotonic_ns() >= next_info_ns) {
+      if (platform::monotonic_ns() >= next_info_ns) {
         transport.publish(io::channel::kRunInfo, run_info);
-        next_info_ns = monotonic_ns() + kRunInfoPeriodNs;
+        next_info_ns = platform::monotonic_ns() + kRunInfoPeriodNs;
       }
       transport.handle(100);
     }
@@ -82,14 +75,15 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
   while (!stop.load(std::memory_order_relaxed)) {
     if (!running) {
       // Nothing to do before the first state.
-      sleep_until(monotonic_ns() + 1'000'000);
+      platform::sleep_until(platform::monotonic_ns() + 1'000'000);
       take_messages();
       if (!ticker.has_new_state()) continue;
       running = true;
       run_id = ticker.state().run_id;
       deadline_ns = first_deadline(ticker.state().utime, phase_ns);
     }
-    sleep_until(deadline_ns);
+    while (!stop.load(std::memory_order_relaxed) && platform::monotonic_ns() < deadline_ns)
+      platform::sleep_until(deadline_ns);
     clock.start();
     timing.wake_latency_us = static_cast<double>(timing.start_utime) - static_cast<double>(deadline_ns) * 1e-3;
     take_messages();
@@ -106,7 +100,7 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
       deadline_ns = first_deadline(ticker.state().utime, phase_ns) - kPeriodNs;
     }
     deadline_ns += kPeriodNs;
-    const std::int64_t now = monotonic_ns();
+    const std::int64_t now = platform::monotonic_ns();
     const std::int64_t missed = now > deadline_ns ? (now - deadline_ns + kPeriodNs - 1) / kPeriodNs : 0;
     deadline_ns += missed * kPeriodNs;
     periods = 1 + static_cast<int>(missed);

@@ -1,37 +1,29 @@
 #pragma once
 // The clocks that the loop reads, so that no module has to.
-#include <ctime>
-
 #include "controller/io/codec.hpp"
+#include "controller/platform/real_time.hpp"
 
 namespace stance::loop {
-
-inline std::int64_t nanoseconds(clockid_t clock) noexcept {
-  timespec now{};
-  clock_gettime(clock, &now);
-  return static_cast<std::int64_t>(now.tv_sec) * 1'000'000'000 + now.tv_nsec;
-}
-inline std::int64_t monotonic_ns() noexcept { return nanoseconds(CLOCK_MONOTONIC); }
 
 /// Times a tick: each stage lasts from the stamp before it to its own.
 class WallClock final : public StageClock {
  public:
   void start() noexcept {
     timing_.stage_us.fill(0.0);
-    const std::int64_t now = monotonic_ns();
+    const std::int64_t now = platform::monotonic_ns();
     timing_.period_us = start_ns_ > 0 ? us(now - start_ns_) : 0.0;
     timing_.start_utime = now / 1000;
     start_ns_ = last_ns_ = now;
-    cpu_ns_ = nanoseconds(CLOCK_THREAD_CPUTIME_ID);
+    cpu_ns_ = platform::thread_cpu_ns();
   }
   void stamp(Stage stage) noexcept override {
-    const std::int64_t now = monotonic_ns();
+    const std::int64_t now = platform::monotonic_ns();
     timing_.stage_us[static_cast<std::size_t>(stage)] += us(now - last_ns_);
     last_ns_ = now;
   }
   void finish() noexcept {
-    timing_.tick_us = us(monotonic_ns() - start_ns_);
-    timing_.cpu_us = us(nanoseconds(CLOCK_THREAD_CPUTIME_ID) - cpu_ns_);
+    timing_.tick_us = us(platform::monotonic_ns() - start_ns_);
+    timing_.cpu_us = us(platform::thread_cpu_ns() - cpu_ns_);
   }
   io::Timing& timing() noexcept { return timing_; }
 

@@ -247,8 +247,8 @@ class Synthetic:
         message = message_type("run_info_t").python_class()
         message.utime, message.seq, message.run_id, message.seed = utime, seq, self.run_id, self.seed
         message.program, message.version, message.source, message.build = program, "0.1.0", "0123abc", "g++ 12 Release"
-        message.robot, message.scenario = "biped", "scenario: stand\n"
-        message.options = f"--robot biped --scenario stand {'--realtime' if self.realtime else '--lockstep'}"
+        message.robot, message.scenario = "biped", "scenario: demo\n"
+        message.options = f"--robot biped --scenario demo {'--realtime' if self.realtime else '--lockstep'}"
         message.urdf, message.configuration, message.input_hash = URDF, CONFIGURATION, "00c0ffee"
         message.tag = bytes(16)
         return bytes(message.encode())

@@ -62,7 +62,7 @@ def test_every_list_that_comes_with_the_package_names_figures_that_exist(path, s
 
 
 def test_standing_keeps_the_limits_and_falling_does_not(stand: Run) -> None:
-    limits = load_limits(limits_file("biped", "stand"))
+    limits = load_limits(limits_file("biped", "demo"))
     assert judge(measure(stand).as_dict(), limits).passed
     fallen = Log.from_bytes(Synthetic(fall_at=2.0, qp_failures=(50,)).log())
     violated = judge(measure(fallen.run(), fallen.report).as_dict(), limits).violated

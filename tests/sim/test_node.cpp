@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "controller/platform/real_time.hpp"
 #include "sim/node.hpp"
-#include "sim/real_time.hpp"
 #include "tests/sim/robots.hpp"
 
 namespace stance::sim {
@@ -117,9 +117,9 @@ TEST_CASE("LockstepTwiceGivesTheSameBytes") {
 TEST_CASE("AnUnansweredStateIsSentAgainUnchangedUntilSilenceEndsTheRun") {
   Bench bench;
   bench.silent_from = 5;
-  const std::int64_t start = monotonic_ns();
+  const std::int64_t start = platform::monotonic_ns();
   const NodeReport report = bench.node.run_lockstep(50, kShort, bench.stop);
-  const double seconds = static_cast<double>(monotonic_ns() - start) * 1e-9;
+  const double seconds = static_cast<double>(platform::monotonic_ns() - start) * 1e-9;
   bench.drain();
   CHECK(report.ending == Ending::kSilence);
   CHECK(seconds >= kShort.silence);
@@ -143,9 +143,9 @@ TEST_CASE("ALateAnswerGoesOnAsIfNothingHadHappened") {
 TEST_CASE("NobodyAtTheStartEndsTheRunAfterTheLongerWait") {
   Bench bench;
   bench.silent_from = 1;
-  const std::int64_t start = monotonic_ns();
+  const std::int64_t start = platform::monotonic_ns();
   CHECK(bench.node.run_lockstep(50, kShort, bench.stop).ending == Ending::kSilence);
-  CHECK(static_cast<double>(monotonic_ns() - start) * 1e-9 >= kShort.first_answer);
+  CHECK(static_cast<double>(platform::monotonic_ns() - start) * 1e-9 >= kShort.first_answer);
 }
 
 TEST_CASE("ARefusedAnswerCountsAndTheRunGoesOn") {
@@ -159,16 +159,16 @@ TEST_CASE("StopEndsARunBetweenInstants") {
   Bench bench;
   bench.stop = true;
   CHECK(bench.node.run_lockstep(20, kShort, bench.stop).ending == Ending::kStopped);
-  CHECK(bench.node.run_real_time(20, monotonic_ns(), bench.stop).ending == Ending::kStopped);
+  CHECK(bench.node.run_real_time(20, platform::monotonic_ns(), bench.stop).ending == Ending::kStopped);
 }
 
 TEST_CASE("ARealTimeRunWithEveryCommandOnTimeEqualsLockstep") {
-  const std::int64_t start_utime = monotonic_ns() / 1000 + 20'000;
+  const std::int64_t start_utime = platform::monotonic_ns() / 1000 + 20'000;
   Bench real_time(start_utime), lockstep(start_utime);
   constexpr int periods = 60;
   const NodeReport report = real_time.node.run_real_time(periods, start_utime * 1000, real_time.stop);
   CHECK(report.ending == Ending::kCompleted);
-  const double seconds = static_cast<double>(monotonic_ns() - start_utime * 1000) * 1e-9;
+  const double seconds = static_cast<double>(platform::monotonic_ns() - start_utime * 1000) * 1e-9;
   CHECK(seconds >= (periods - 1) * kControlPeriod);
   static_cast<void>(lockstep.node.run_lockstep(periods, kShort, lockstep.stop));
   real_time.drain();
@@ -179,7 +179,7 @@ TEST_CASE("ARealTimeRunWithEveryCommandOnTimeEqualsLockstep") {
 }
 
 TEST_CASE("ARealTimeRunNeverWaitsForACommand") {
-  const std::int64_t start_utime = monotonic_ns() / 1000 + 1'000;
+  const std::int64_t start_utime = platform::monotonic_ns() / 1000 + 1'000;
   Bench bench(start_utime);
   bench.silent_from = 11;
   const NodeReport report = bench.node.run_real_time(30, start_utime * 1000, bench.stop);

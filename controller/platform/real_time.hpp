@@ -3,10 +3,13 @@
 #include <cstdint>
 #include <string>
 
-namespace stance::sim {
+namespace stance::platform {
 
 /// ns of CLOCK_MONOTONIC.
 std::int64_t monotonic_ns() noexcept;
+
+/// ns of this thread's CPU time.
+std::int64_t thread_cpu_ns() noexcept;
 
 /// Until `deadline_ns` of that clock; a signal ends it early.
 void sleep_until(std::int64_t deadline_ns) noexcept;
@@ -16,4 +19,4 @@ void sleep_until(std::int64_t deadline_ns) noexcept;
 /// nothing was.
 std::string enter_real_time(int priority, int cpu);
 
-}  // namespace stance::sim
+}  // namespace stance::platform

@@ -1,4 +1,4 @@
-#include "sim/real_time.hpp"
+#include "controller/platform/real_time.hpp"
 
 #include <sched.h>
 #include <sys/mman.h>
@@ -8,10 +8,16 @@
 #include <cerrno>
 #include <cstring>
 
-namespace stance::sim {
+namespace stance::platform {
 namespace {
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
+
+std::int64_t nanoseconds(clockid_t clock) noexcept {
+  timespec now{};
+  clock_gettime(clock, &now);
+  return now.tv_sec * kSecondNs + now.tv_nsec;
+}
 
 void touch_stack() noexcept {
   std::array<unsigned char, 256 * 1024> pages;
@@ -21,11 +27,9 @@ void touch_stack() noexcept {
 
 }  // namespace
 
-std::int64_t monotonic_ns() noexcept {
-  timespec now{};
-  clock_gettime(CLOCK_MONOTONIC, &now);
-  return now.tv_sec * kSecondNs + now.tv_nsec;
-}
+std::int64_t monotonic_ns() noexcept { return nanoseconds(CLOCK_MONOTONIC); }
+
+std::int64_t thread_cpu_ns() noexcept { return nanoseconds(CLOCK_THREAD_CPUTIME_ID); }
 
 void sleep_until(std::int64_t deadline_ns) noexcept {
   const timespec deadline{deadline_ns / kSecondNs, deadline_ns % kSecondNs};
@@ -53,4 +57,4 @@ std::string enter_real_time(int priority, int cpu) {
   return refused;
 }
 
-}  // namespace stance::sim
+}  // namespace stance::platform
