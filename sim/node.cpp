@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "controller/platform/real_time.hpp"
+#include "stance_commit.hpp"
 
 namespace stance::sim {
 namespace {

@@ -4,6 +4,8 @@
 #include <stance_msgs/run_info_t.hpp>
 #include <stdexcept>
 
+#include "stance_commit.hpp"
+
 namespace stance::io {
 namespace {
 
