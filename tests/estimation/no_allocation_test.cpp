@@ -1,49 +1,21 @@
 // The estimator's step takes no memory: malloc itself is watched, since Eigen's own guard sees only Eigen.
 #include <catch2/catch_test_macros.hpp>
-#include <cstddef>
 
 #include "controller/estimation/base_estimator.hpp"
 #include "controller/estimation/com_offset_observer.hpp"
 #include "tests/estimation/simulated_robot.hpp"
-
-namespace {
-thread_local bool watching = false;
-thread_local std::size_t allocations = 0;
-}  // namespace
-
-extern "C" {
-void* __libc_malloc(std::size_t size);
-void* __libc_calloc(std::size_t count, std::size_t size);
-void* __libc_realloc(void* pointer, std::size_t size);
-void* __libc_memalign(std::size_t alignment, std::size_t size);
-
-void* malloc(std::size_t size) noexcept {
-  allocations += watching;
-  return __libc_malloc(size);
-}
-void* calloc(std::size_t count, std::size_t size) noexcept {
-  allocations += watching;
-  return __libc_calloc(count, size);
-}
-void* realloc(void* pointer, std::size_t size) noexcept {
-  allocations += watching;
-  return __libc_realloc(pointer, size);
-}
-void* aligned_alloc(std::size_t alignment, std::size_t size) noexcept {
-  allocations += watching;
-  return __libc_memalign(alignment, size);
-}
-}
+#include "tests/support/heap_calls.hpp"
 
 namespace stance::estimation::test {
 
-TEST_CASE("WatchSeesAnAllocation") {
-  allocations = 0;
-  watching = true;
+using stance::test::heap_calls;
+
+TEST_CASE("HeapCallsAreCounted") {
+  const long before = heap_calls;
   int* volatile number = new int(1);
-  watching = false;
   delete number;
-  CHECK(allocations == 1);
+  const long calls = heap_calls - before;
+  CHECK(calls == 2);
 }
 
 TEST_CASE("StepTakesNoMemory") {
@@ -61,17 +33,17 @@ TEST_CASE("StepTakesNoMemory") {
   BaseEstimate estimate;
   CentreOfMassOffsetInput input;
   input.standing = true;
-  allocations = 0;
+  long calls = 0;
   for (int k = 0; k < 300; ++k) {
     const RobotState& state = robot.next();
-    watching = true;
+    const long before = heap_calls;
     estimator.step(state, {}, estimate);
     input.p_WC = estimate.p_WB;
     input.p_WF = {estimate.p_WF[0], estimate.p_WF[1]};
     observer.step(input, 0.01);
-    watching = false;
+    calls += heap_calls - before;
   }
-  CHECK(allocations == 0);
+  CHECK(calls == 0);
 }
 
 }  // namespace stance::estimation::test
