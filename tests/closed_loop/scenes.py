@@ -105,9 +105,9 @@ def kill_controller(out: Path) -> dict[str, Any]:
     )
     controller.send_signal(signal.SIGKILL)
     controller.wait()
-    last_answered = listener.trace.state_seq if listener.trace else 0
     damped = listener.wait(lambda: bool(listener.truth and listener.truth.drives_damped), 5)
     damped_seq = listener.truth.seq if listener.truth else 0
+    last_answered = listener.trace.state_seq if listener.trace else 0  # by now all that it said has been heard
     listener.wait(lambda: bool(listener.truth and listener.truth.seq > damped_seq + 150), 10)  # it falls
     listener.trace = None
     controller = subprocess.Popen(controller_command)
