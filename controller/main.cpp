@@ -1,21 +1,17 @@
 // stance-controller: arguments -> configuration -> loop.
 #include <CLI/CLI.hpp>
 #include <atomic>
-#include <csignal>
 #include <iomanip>
 #include <iostream>
 
 #include "controller/compose.hpp"
 #include "controller/io/run_info.hpp"
 #include "controller/loop/loop.hpp"
+#include "controller/platform/program.hpp"
 #include "controller/platform/real_time.hpp"
 #include "controller/rigid_body/dynamics.hpp"
 
 namespace {
-
-std::atomic<bool> stop{false};
-static_assert(std::atomic<bool>::is_always_lock_free);
-void on_signal(int /*signal*/) { stop.store(true, std::memory_order_relaxed); }
 
 /// The robot as this program reads it, as JSON: what a contract with other readers is checked against.
 void describe(const stance::config::RobotDescription& robot) {
@@ -50,7 +46,7 @@ int main(int argc, char** argv) {
   using namespace stance;
   CLI::App app{"Stance's controller: answers ROBOT_STATE with JOINT_COMMAND over LCM, every 10 ms."};
   app.set_version_flag("--version", STANCE_VERSION);
-  std::string robot_name, url = io::kDefaultUrl, engine;
+  std::string robot_name, url = platform::kDefaultLcmUrl, engine;
   bool lockstep = false, real_time = false, describe_only = false;
   int priority = 80, cpu = -1;
   loop::RealTimeConfig config;
@@ -64,6 +60,9 @@ int main(int argc, char** argv) {
   app.add_option("--cpu", cpu, "Core to pin to");
   app.add_option("--phase", config.phase, "Seconds from a state's stamp to the tick that takes it")
       ->check(CLI::Range(0.0, 0.009))
+      ->capture_default_str();
+  app.add_option("--state-wait", config.state_wait, "Seconds that a tick waits for a state that is late")
+      ->check(CLI::Range(0.0, 0.008))
       ->capture_default_str();
   app.add_flag("--describe", describe_only, "Print the robot as it was read, as JSON, and end");
   try {
@@ -80,12 +79,10 @@ int main(int argc, char** argv) {
     }
     if (!engine.empty()) robot.yaml_text = with_engine(robot.yaml_text, engine);
     loop::Ticker ticker(compose(robot));
-    std::string options;
-    for (int i = 1; i < argc; ++i) options += (i > 1 ? " " : "") + std::string(argv[i]);
-    const auto run_info = io::encode(io::RunInfo{robot.name, options, robot.urdf_text, robot.yaml_text});
+    const auto run_info =
+        io::encode(io::RunInfo{robot.name, platform::command_line(argc, argv), robot.urdf_text, robot.yaml_text});
 
-    std::signal(SIGINT, on_signal);
-    std::signal(SIGTERM, on_signal);
+    const std::atomic<bool>& stop = platform::stop_on_signals();
     if (lockstep) {
       io::Transport transport(url);
       loop::run_lockstep(ticker, transport, run_info, stop);

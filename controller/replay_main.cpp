@@ -5,32 +5,38 @@
 #include <cstdint>
 #include <iostream>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "controller/compose.hpp"
 #include "controller/io/log.hpp"
 #include "controller/io/run_info.hpp"
 #include "controller/loop/wall_clock.hpp"
+#include "controller/platform/hash.hpp"
 
 namespace {
 
 using namespace stance;
 using Payload = std::vector<std::uint8_t>;
 
-/// What a log holds of one controller, by tick and by sequence number.
+/// Messages by what a trace calls them; a name may stand for several, whose hash tells them apart.
+template <typename Key>
+using Named = std::map<Key, std::vector<Payload>>;
+
+/// What a log holds of one controller.
 struct Recording {
   io::RunInfo info;
   bool has_info = false;
   std::map<std::int64_t, io::TraceKey> ticks;
   std::map<std::int64_t, Payload> traces, commands, plans;          // by tick
-  std::map<std::pair<std::int64_t, std::int64_t>, Payload> states;  // by run and seq
-  std::map<std::int64_t, Payload> user_commands, stops;             // by seq
+  Named<std::pair<std::int64_t, std::int64_t>> states;              // by run and seq
+  Named<std::int64_t> user_commands, stops;                         // by seq
 };
 
-template <typename Message, typename Map>
-void keep(io::Bytes bytes, Map& map) {
-  Message message;
-  if (io::decode(bytes, message)) map[message.seq] = Payload(bytes.begin(), bytes.end());
+template <typename Key>
+void keep(Named<Key>& messages, const Key& name, const Payload& payload) {
+  std::vector<Payload>& known = messages[name];
+  if (std::find(known.begin(), known.end(), payload) == known.end()) known.push_back(payload);
 }
 
 Recording read(const std::string& file) {
@@ -43,11 +49,13 @@ Recording read(const std::string& file) {
       recording.has_info = io::decode(event.bytes, recording.info) || recording.has_info;
     } else if (event.channel == io::channel::kRobotState) {
       RobotState state;
-      if (io::decode(event.bytes, state)) recording.states[{state.run_id, state.seq}] = payload;
+      if (io::decode(event.bytes, state)) keep(recording.states, {state.run_id, state.seq}, payload);
     } else if (event.channel == io::channel::kUserCommand) {
-      keep<UserCommand>(event.bytes, recording.user_commands);
+      UserCommand command;
+      if (io::decode(event.bytes, command)) keep(recording.user_commands, command.seq, payload);
     } else if (event.channel == io::channel::kStop) {
-      keep<io::Stop>(event.bytes, recording.stops);
+      io::Stop stop;
+      if (io::decode(event.bytes, stop)) keep(recording.stops, stop.seq, payload);
     } else if (event.channel == io::channel::kTrace) {
       io::TraceKey key;
       if (!io::decode(event.bytes, key)) continue;
@@ -58,6 +66,40 @@ Recording read(const std::string& file) {
     }
   }
   return recording;
+}
+
+/// What a tick took anew, null where nothing of a kind.
+struct Taken {
+  const Payload* state = nullptr;
+  const Payload* user_command = nullptr;
+  const Payload* stop = nullptr;
+};
+
+/// The recorded messages with the hash that the tick's trace states; nothing where the log does not hold them all.
+std::optional<Taken> taken_by(const Recording& recording, const io::TraceKey& tick) {
+  const auto choices = [](const auto& messages, const auto& name, bool none_too) {
+    std::vector<const Payload*> found;
+    if (none_too) found.push_back(nullptr);
+    const auto named = messages.find(name);
+    if (named == messages.end()) return found;
+    for (const Payload& payload : named->second) found.push_back(&payload);
+    return found;
+  };
+  const auto hash = [](const Payload* payload) { return payload == nullptr ? 0 : platform::hash(*payload); };
+  std::vector<const Payload*> states{nullptr};
+  if (tick.consumed.state_is_new) {
+    states = choices(recording.states, std::pair(tick.header.run_id, tick.header.state_seq), false);
+  }
+  for (const Payload* state : states) {
+    for (const Payload* user_command : choices(recording.user_commands, tick.consumed.user_command_seq, true)) {
+      for (const Payload* stop : choices(recording.stops, tick.consumed.stop_seq, true)) {
+        if (loop::consumed_hash(hash(state), hash(user_command), hash(stop)) == tick.consumed.hash) {
+          return Taken{state, user_command, stop};
+        }
+      }
+    }
+  }
+  return std::nullopt;
 }
 
 struct Outcome {
@@ -72,35 +114,23 @@ Outcome verify(const Recording& recording) {
   Outcome outcome;
   loop::Ticker ticker(compose(config::robot_from_texts(recording.info.configuration, recording.info.urdf)));
   loop::NoClock clock;
-  std::int64_t user_command_seq = 0, stop_seq = 0, expected = 1;
+  std::int64_t expected = 1;
   for (const auto& [seq, tick] : recording.ticks) {
-    const auto missing = [&](const char* what, std::int64_t which) {
-      outcome.incomplete = "tick " + std::to_string(seq) + " needs " + what + " " + std::to_string(which) +
-                           ", which the log does not hold";
-    };
     if (seq != expected++) {
-      missing("the trace of tick", seq - 1);
+      outcome.incomplete = "the log does not hold the trace of tick " + std::to_string(seq - 1);
       break;
     }
-    if (tick.consumed.user_command_seq != user_command_seq) {
-      user_command_seq = tick.consumed.user_command_seq;
-      const auto found = recording.user_commands.find(user_command_seq);
-      if (found == recording.user_commands.end()) return missing("user command", user_command_seq), outcome;
-      static_cast<void>(ticker.offer_user_command(found->second));
+    const std::optional<Taken> taken = taken_by(recording, tick);
+    if (!taken) {
+      outcome.incomplete = "the log does not hold what tick " + std::to_string(seq) + " took: state " +
+                           std::to_string(tick.header.state_seq) + ", user command " +
+                           std::to_string(tick.consumed.user_command_seq) + ", stop " +
+                           std::to_string(tick.consumed.stop_seq) + ", as they were";
+      break;
     }
-    if (tick.consumed.state_is_new) {
-      const auto found = recording.states.find({tick.header.run_id, tick.header.state_seq});
-      if (found == recording.states.end()) return missing("state", tick.header.state_seq), outcome;
-      static_cast<void>(ticker.offer_state(found->second));
-    }
-    if (tick.consumed.stop_seq != stop_seq) {
-      stop_seq = tick.consumed.stop_seq;
-      if (stop_seq != 0) {
-        const auto found = recording.stops.find(stop_seq);
-        if (found == recording.stops.end()) return missing("stop", stop_seq), outcome;
-        static_cast<void>(ticker.offer_stop(found->second));
-      }
-    }
+    if (taken->state != nullptr) static_cast<void>(ticker.offer_state(*taken->state));
+    if (taken->user_command != nullptr) static_cast<void>(ticker.offer_user_command(*taken->user_command));
+    if (taken->stop != nullptr) static_cast<void>(ticker.offer_stop(*taken->stop));
     ticker.tick(tick.consumed.periods, clock);
     ++outcome.ticks;
 

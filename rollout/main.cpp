@@ -12,6 +12,8 @@
 #include "controller/io/log.hpp"
 #include "controller/io/run_info.hpp"
 #include "controller/loop/wall_clock.hpp"
+#include "controller/platform/hash.hpp"
+#include "controller/platform/program.hpp"
 #include "sim/simulator.hpp"
 
 namespace {
@@ -45,7 +47,7 @@ struct Summary {
   bool fallen = false;
   double max_tilt = 0.0;  ///< rad, of the trunk
   std::int64_t qp_failures = 0;
-  std::uint64_t command_hash = io::kHashSeed;  ///< of every JOINT_COMMAND
+  std::uint64_t command_hash = platform::kHashSeed;  ///< of every JOINT_COMMAND
 };
 
 void print(const Summary& s, const sim::Simulator& simulator, bool json) {
@@ -108,9 +110,9 @@ int main(int argc, char** argv) {
     const auto record = [&](const char* channel, io::Bytes bytes) {
       if (log) log->write(simulator.state().utime, channel, bytes);
     };
-    std::string arguments;
-    for (int i = 1; i < argc; ++i) arguments += (i > 1 ? " " : "") + std::string(argv[i]);
-    record(io::channel::kRunInfo, io::encode(io::RunInfo{robot.name, arguments, robot.urdf_text, robot.yaml_text}));
+    record(
+        io::channel::kRunInfo,
+        io::encode(io::RunInfo{robot.name, platform::command_line(argc, argv), robot.urdf_text, robot.yaml_text}));
 
     Encoded<stance_msgs::robot_state_t> state;
     Encoded<stance_msgs::user_command_t> user_command;
@@ -141,7 +143,7 @@ int main(int argc, char** argv) {
       const auto& q = simulator.truth().quat_WB;
       summary.max_tilt =
           std::max(summary.max_tilt, std::acos(std::clamp(1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]), -1.0, 1.0)));
-      summary.command_hash = io::hash(ticker.command().bytes(), summary.command_hash);
+      summary.command_hash = platform::hash(ticker.command().bytes(), summary.command_hash);
     }
     summary.wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     summary.duration = simulator.time();

@@ -3,26 +3,15 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <csignal>
 #include <cstdio>
 #include <iostream>
 #include <string>
 
+#include "controller/platform/program.hpp"
 #include "controller/platform/real_time.hpp"
 #include "sim/node.hpp"
 
 namespace {
-
-std::atomic<bool> stop{false};
-static_assert(std::atomic<bool>::is_always_lock_free);
-void on_signal(int /*signal*/) { stop.store(true, std::memory_order_relaxed); }
-
-void catch_signals() {
-  struct sigaction action {};
-  action.sa_handler = on_signal;  // without SA_RESTART: sleeping ends at once
-  sigaction(SIGINT, &action, nullptr);
-  sigaction(SIGTERM, &action, nullptr);
-}
 
 void print_summary(const stance::sim::Simulator& simulator, const stance::sim::NodeReport& report, bool real_time) {
   const auto& refused = simulator.refused();
@@ -47,7 +36,7 @@ int main(int argc, char** argv) {
   using namespace stance;
   CLI::App app{"Stance's simulator: a robot in Bullet, that speaks as the robot would over LCM."};
   app.set_version_flag("--version", STANCE_VERSION);
-  std::string robot_name, scenario_name, plant_name, url = "udpm://239.255.76.67:7667?ttl=0";
+  std::string robot_name, scenario_name, plant_name, url = platform::kDefaultLcmUrl;
   bool lockstep = false, real_time = false;
   double duration = 0.0;
   int priority = 60, cpu = -1;
@@ -82,9 +71,6 @@ int main(int argc, char** argv) {
     if (!plant_name.empty()) options.plant = sim::plant_from_name(plant_name);
     const auto periods =
         static_cast<std::int64_t>(std::llround((duration > 0.0 ? duration : scenario.duration) / kControlPeriod));
-    std::string arguments;
-    for (int i = 1; i < argc; ++i) arguments += (i > 1 ? " " : "") + std::string(argv[i]);
-
     if (!lockstep) {
       const std::string refused = platform::enter_real_time(priority, cpu);
       if (!refused.empty()) std::cerr << "stance-sim: without real-time privileges (" << refused << ")\n";
@@ -96,14 +82,14 @@ int main(int argc, char** argv) {
                    "dev lo'\n";
       return 2;
     }
-    catch_signals();
+    const std::atomic<bool>& stop = platform::stop_on_signals();
 
     constexpr std::int64_t settle_ns = 100'000'000;  // from here to the first instant
     constexpr std::int64_t us_ns = 1000;
     const std::int64_t start_utime = (platform::monotonic_ns() + settle_ns) / us_ns;
     if (!lockstep) options.start_utime = start_utime;
     sim::Simulator simulator(robot, scenario, options);
-    sim::Node node(lcm, simulator, sim::encode_run_info(robot, scenario, options, arguments));
+    sim::Node node(lcm, simulator, sim::encode_run_info(robot, scenario, options, platform::command_line(argc, argv)));
     const sim::NodeReport report = lockstep ? node.run_lockstep(periods, sim::LockstepTiming{}, stop)
                                             : node.run_real_time(periods, start_utime * us_ns, stop);
     if (report.ending == sim::Ending::kSilence) {

@@ -9,6 +9,7 @@
 #include <string_view>
 #include <utility>
 
+#include "controller/platform/hash.hpp"
 #include "controller/platform/real_time.hpp"
 #include "stance_commit.hpp"
 
@@ -32,10 +33,8 @@ void encode(const Message& message, std::vector<std::uint8_t>& bytes) {
 
 /// FNV-1a, 64 bit, of the texts one after the other, in hexadecimal.
 std::string hash_of(std::initializer_list<std::string_view> texts) {
-  std::uint64_t hash = 14695981039346656037ULL;
-  for (const std::string_view text : texts) {
-    for (const char c : text) hash = (hash ^ static_cast<unsigned char>(c)) * 1099511628211ULL;
-  }
+  std::uint64_t hash = platform::kHashSeed;
+  for (const std::string_view text : texts) hash = platform::hash(text, hash);
   std::array<char, 17> digits{};
   std::snprintf(digits.data(), digits.size(), "%016" PRIx64, hash);
   return digits.data();
@@ -109,11 +108,7 @@ void Node::publish_instant() {
 }
 
 void Node::housekeeping() {
-  const std::int64_t now = platform::monotonic_ns();
-  if (now >= next_run_info_ns_) {
-    lcm_.publish(kRunInfo, run_info_.data(), static_cast<unsigned>(run_info_.size()));
-    next_run_info_ns_ = now + kSecondNs;
-  }
+  if (run_info_pace_.due()) lcm_.publish(kRunInfo, run_info_.data(), static_cast<unsigned>(run_info_.size()));
   const bool damped = simulator_.truth().drives_damped != 0;
   if (damped && !was_damped_) {
     ++report_.times_damped;
@@ -170,6 +165,7 @@ NodeReport Node::run_lockstep(std::int64_t periods, const LockstepTiming& timing
 
 NodeReport Node::run_real_time(std::int64_t periods, std::int64_t start_ns, const std::atomic<bool>& stop) {
   constexpr auto deadline_after = static_cast<std::int64_t>(kCommandDeadline * 1e9);
+  constexpr auto answer_time = static_cast<std::int64_t>(kAnswerTime * 1e9);
   constexpr auto late = static_cast<std::int64_t>(kLate * 1e9);
   housekeeping();
   for (std::int64_t k = 0; k < periods; ++k) {
@@ -184,7 +180,7 @@ NodeReport Node::run_real_time(std::int64_t periods, std::int64_t start_ns, cons
     if (lateness > late) ++report_.late_instants;
     report_.worst_lateness = std::max(report_.worst_lateness, static_cast<double>(lateness) * 1e-9);
     housekeeping();
-    take_messages_until(instant + deadline_after, stop);
+    take_messages_until(std::max(instant + deadline_after, platform::monotonic_ns() + answer_time), stop);
     simulator_.advance();
   }
   publish_truth();

@@ -4,8 +4,9 @@
 // Lockstep: the next instant comes when the JOINT_COMMAND that answers the state has arrived; the controller sends its
 // FORCE_PLAN before it. Without an answer the same bytes of the state go out again and again, and silence ends the run.
 // Real time: instants stand on an absolute grid of the monotonic clock. What has arrived by kCommandDeadline after an
-// instant counts as given at it, then the whole period is computed at once; the simulator never waits for a command. So
-// a run whose every command is on time equals the lockstep run, bit for bit.
+// instant counts as given at it (later where the machine made the instant itself late: each state leaves kAnswerTime for
+// its answer), then the whole period is computed at once; the simulator never waits for a command. So a run whose every
+// command is on time equals the lockstep run, bit for bit.
 #include <atomic>
 #include <cstdint>
 #include <lcm/lcm-cpp.hpp>
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "controller/config/robot_description.hpp"
+#include "controller/platform/program.hpp"
 #include "sim/scenario.hpp"
 #include "sim/simulator.hpp"
 
@@ -41,6 +43,7 @@ struct NodeReport {
 class Node {
  public:
   static constexpr double kCommandDeadline = 0.008;  ///< s after an instant
+  static constexpr double kAnswerTime = 0.005;       ///< s, at least, from a state's sending
   static constexpr double kLate = 0.001;             ///< s
 
   /// Subscribes. `run_info` is published at the start and each second.
@@ -70,7 +73,7 @@ class Node {
   std::vector<std::uint8_t> state_bytes_;
   std::vector<std::uint8_t> truth_bytes_;
   std::vector<std::uint8_t> user_command_bytes_;
-  std::int64_t next_run_info_ns_ = 0;
+  platform::EverySecond run_info_pace_;
   std::int64_t answered_seq_ = 0;  // newest state that a command answered
   bool was_damped_ = false;
   NodeReport report_;

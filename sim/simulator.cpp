@@ -131,7 +131,7 @@ Acceptance Simulator::accept(const joint_command_t& command) noexcept {
 }
 
 bool Simulator::accept(const force_plan_t& plan) noexcept {
-  if (plan.run_id != options_.run_id || plan.num_contacts != static_cast<int>(num_contacts_) || plan.num_stages < 1) {
+  if (plan.run_id != options_.run_id || plan.num_contacts != static_cast<int>(num_contacts_) || plan.num_stages < 0) {
     return false;
   }
   if (plan.state_seq > state_.seq || plan.state_seq < newest_plan_state_seq_ ||
@@ -242,7 +242,7 @@ void Simulator::write_messages(const Sums& sums) noexcept {
   const Mechanics mechanics = plant([](const auto& p) { return p.mechanics(); });
   const ContactVectors tips = plant([](const auto& p) { return p.foot_tips_W(); });
   const Quaternion rotation(now.R_WB);
-  const bool has_plan = plans_.valid(step_ - 1, timeout_steps_);
+  const bool has_plan = plans_.valid(step_ - 1, timeout_steps_) && plans_.current.num_stages > 0;
   truth_.utime = utime;
   truth_.seq = seq;
   truth_.run_id = options_.run_id;

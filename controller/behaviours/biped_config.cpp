@@ -30,6 +30,9 @@ void BipedConfig::validate() const {
   require(stand.force_weight > 0.0, "stand.force_weight", stand.force_weight, "> 0");
   require(stand.height_integral_gain >= 0.0, "stand.height_integral_gain", stand.height_integral_gain, ">= 0");
   require(stand.height_integral_limit >= 0.0, "stand.height_integral_limit", stand.height_integral_limit, ">= 0 m");
+  const auto [lowest, highest] = stand.height_offset_range;
+  require(lowest <= 0.0, "stand.height_offset_range's least", lowest, "<= 0 m");
+  require(highest >= 0.0, "stand.height_offset_range's greatest", highest, ">= 0 m");
   require(torque_map.null_space_kp >= 0.0, "torque_map.null_space_kp", torque_map.null_space_kp, ">= 0");
   require(torque_map.null_space_kd >= 0.0, "torque_map.null_space_kd", torque_map.null_space_kd, ">= 0");
   require(torque_map.lead >= 0.0 && torque_map.lead < 0.05, "torque_map.lead", torque_map.lead, "in 0..0.05 s");

@@ -20,6 +20,7 @@ struct StandConfig {
   double force_weight = 0.0;                                ///< R's diagonal
   double height_integral_gain = 0.0;                        ///< 1/s
   double height_integral_limit = 0.0;                       ///< m
+  std::array<double, 2> height_offset_range{};              ///< m, that an operator may ask for
 };
 
 struct TorqueMapConfig {

@@ -46,6 +46,8 @@ Nominal nominal_posture(const rigid_body::Model& model, const std::array<rigid_b
   return nominal;
 }
 
+bool has_plan(const TickOutput& out) noexcept { return out.plan.num_stages > 0; }
+
 }  // namespace
 
 BipedController::BipedController(const BipedConfig& config, const rigid_body::Model& model,
@@ -72,8 +74,7 @@ BipedController::BipedController(const BipedConfig& config, const rigid_body::Mo
 void BipedController::start_run(std::int64_t run_id) noexcept {
   memory_ = Memory{};
   memory_.run_id = run_id;
-  // Nothing to hold before the first plan.
-  override_command(SafetyMode::kDamp, memory_.last.command);
+  give_up(SafetyMode::kDamp, memory_.last);
   ladder_ = safety::FaultLadder(config_.fault_ladder);
   estimator_ = fresh_estimator_;
   observer_ = fresh_observer_;
@@ -98,14 +99,17 @@ void BipedController::step(const TickInput& input, StageClock& clock, TickOutput
     // Where it fails, the last plan's forces stay.
     if (!ladder_.latched() && stand_.solve(out.plan, trace) != QpStatus::kSolved) ladder_.report(Fault::kQpFailed);
     clock.stamp(Stage::kForceQp);
-    torque_map_.stance(body_, out.plan.force.front(), out.command);
+    if (has_plan(out)) {
+      torque_map_.stance(body_, out.plan.force.front(), out.command);
+      trace.torques_clipped = safety::limit_torques(model_, out.command);
+      if (trace.torques_clipped > 0) ladder_.report(Fault::kTorqueSaturated);
+    }
     clock.stamp(Stage::kTorque);
-    trace.torques_clipped = safety::limit_torques(model_, out.command);
-    if (trace.torques_clipped > 0) ladder_.report(Fault::kTorqueSaturated);
     if (safety::joint_outside_limits(model_, body_.state.q)) ladder_.report(Fault::kJointLimit);
   }
-  override_command(ladder_.step(input.periods), out.command);
-  trace.safety = ladder_.mode();
+  const SafetyMode mode = ladder_.step(input.periods, has_plan(out));
+  if (mode == SafetyMode::kDamp || mode == SafetyMode::kStop) give_up(mode, out);
+  trace.safety = mode;
   trace.faults = ladder_.faults();
   trace.fault_count = ladder_.counts();
   memory_.last = out;
@@ -119,7 +123,9 @@ bool BipedController::accept(const TickInput& input) noexcept {
 
   const UserCommand& command = input.user_command;
   if (command.seq != memory_.user_command.seq) {
-    const bool offered = command.behaviour == Behaviour::kStand;
+    const bool offered = command.behaviour == Behaviour::kStand &&
+                         command.height_offset >= config_.stand.height_offset_range[0] &&
+                         command.height_offset <= config_.stand.height_offset_range[1];
     if (safety::command_is_plausible(command) && offered) {
       memory_.user_command = command;
     } else {
@@ -192,12 +198,14 @@ bool BipedController::has_fallen(const BaseEstimate& base) const noexcept {
   return base.R_WB(2, 2) < config_.fall.min_upright || base.p_WB.z() - feet_z < config_.fall.min_height;
 }
 
-void BipedController::override_command(SafetyMode mode, JointCommand& command) const noexcept {
-  if (mode != SafetyMode::kDamp && mode != SafetyMode::kStop) return;
-  command = JointCommand{};
-  command.num_joints = model_.num_joints;
-  command.mode = mode == SafetyMode::kDamp ? DriveMode::kDamp : DriveMode::kStop;
-  if (mode == SafetyMode::kDamp) command.kd = config_.damping;
+void BipedController::give_up(SafetyMode mode, TickOutput& out) const noexcept {
+  out.command = JointCommand{};
+  out.command.num_joints = model_.num_joints;
+  out.command.mode = mode == SafetyMode::kDamp ? DriveMode::kDamp : DriveMode::kStop;
+  if (mode == SafetyMode::kDamp) out.command.kd = config_.damping;
+  out.plan = ForcePlan{};
+  out.plan.num_contacts = kFeet;
+  out.trace.effort = 0.0;
 }
 
 }  // namespace stance::behaviours

@@ -42,7 +42,8 @@ class BipedController {
   void estimate(const RobotState& state, BaseEstimate& base) noexcept;
   void plan(int periods, Trace& trace) noexcept;
   bool has_fallen(const BaseEstimate& base) const noexcept;
-  void override_command(SafetyMode mode, JointCommand& command) const noexcept;
+  /// No forces: what the robot is commanded in DAMP and STOP.
+  void give_up(SafetyMode mode, TickOutput& out) const noexcept;
 
   BipedConfig config_;
   rigid_body::Model model_;

@@ -68,6 +68,8 @@ behaviours::StandConfig stand(StrictYaml yaml) {
   c.force_weight = yaml.number("force_weight");
   c.height_integral_gain = yaml.number("height_integral_gain");
   c.height_integral_limit = yaml.number("height_integral_limit");
+  const auto range = yaml.numbers("height_offset_range", 2);
+  c.height_offset_range = {range[0], range[1]};
   yaml.finish();
   return c;
 }

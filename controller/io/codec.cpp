@@ -209,10 +209,4 @@ void encode(const Header& header, const Timing& timing, Message& out) noexcept {
   encode_whole(message, out);
 }
 
-std::uint64_t hash(Bytes bytes, std::uint64_t seed) noexcept {
-  std::uint64_t value = seed;
-  for (const std::uint8_t byte : bytes) value = (value ^ byte) * 1099511628211ULL;
-  return value;
-}
-
 }  // namespace stance::io

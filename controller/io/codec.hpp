@@ -89,8 +89,4 @@ void encode(const Header& header, const ForcePlan& plan, Message& out) noexcept;
 void encode(const Header& header, const Consumed& consumed, const Trace& trace, Message& out) noexcept;
 void encode(const Header& header, const Timing& timing, Message& out) noexcept;
 
-/// FNV-1a, 64 bit; start from kHashSeed and chain.
-inline constexpr std::uint64_t kHashSeed = 14695981039346656037ULL;
-std::uint64_t hash(Bytes bytes, std::uint64_t seed = kHashSeed) noexcept;
-
 }  // namespace stance::io

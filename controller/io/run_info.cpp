@@ -4,14 +4,10 @@
 #include <stance_msgs/run_info_t.hpp>
 #include <stdexcept>
 
+#include "controller/platform/hash.hpp"
 #include "stance_commit.hpp"
 
 namespace stance::io {
-namespace {
-
-Bytes text_bytes(const std::string& text) { return {reinterpret_cast<const std::uint8_t*>(text.data()), text.size()}; }
-
-}  // namespace
 
 std::vector<std::uint8_t> encode(const RunInfo& info) {
   stance_msgs::run_info_t message{};
@@ -25,7 +21,7 @@ std::vector<std::uint8_t> encode(const RunInfo& info) {
   message.configuration = info.configuration;
   char text[17];
   std::snprintf(text, sizeof text, "%016llx",
-                static_cast<unsigned long long>(hash(text_bytes(info.configuration), hash(text_bytes(info.urdf)))));
+                static_cast<unsigned long long>(platform::hash(info.configuration, platform::hash(info.urdf))));
   message.input_hash = text;
   std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
   message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));

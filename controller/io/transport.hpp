@@ -8,8 +8,6 @@
 
 namespace stance::io {
 
-inline constexpr const char* kDefaultUrl = "udpm://239.255.76.67:7667?ttl=0";
-
 class Transport {
  public:
   /// Throws std::runtime_error, saying what to do, where LCM cannot be brought up on `url`.

@@ -1,12 +1,8 @@
 #include "controller/loop/loop.hpp"
 #include "controller/loop/wall_clock.hpp"
+#include "controller/platform/program.hpp"
 
 namespace stance::loop {
-namespace {
-
-constexpr std::int64_t kRunInfoPeriodNs = 1'000'000'000;
-
-}  // namespace
 
 void run_lockstep(Ticker& ticker, io::Transport& transport, const std::vector<std::uint8_t>& run_info,
                   const std::atomic<bool>& stop) {
@@ -41,12 +37,9 @@ void run_lockstep(Ticker& ticker, io::Transport& transport, const std::vector<st
     transport.publish(io::channel::kTiming, timing.bytes());
   });
 
-  std::int64_t next_info_ns = 0;
+  platform::EverySecond info_pace;
   while (!stop.load(std::memory_order_relaxed)) {
-    if (platform::monotonic_ns() >= next_info_ns) {
-      transport.publish(io::channel::kRunInfo, run_info);
-      next_info_ns = platform::monotonic_ns() + kRunInfoPeriodNs;
-    }
+    if (info_pace.due()) transport.publish(io::channel::kRunInfo, run_info);
     transport.handle(100);
   }
 }

@@ -3,12 +3,13 @@
 #include "controller/loop/loop.hpp"
 #include "controller/loop/mailbox.hpp"
 #include "controller/loop/wall_clock.hpp"
+#include "controller/platform/program.hpp"
 
 namespace stance::loop {
 namespace {
 
 constexpr std::int64_t kPeriodNs = 10'000'000;
-constexpr std::int64_t kRunInfoPeriodNs = 1'000'000'000;
+constexpr std::int64_t kStatePollNs = 100'000;
 static_assert(kPeriodNs * 1e-9 == kControlPeriod);
 
 /// What the receiving thread leaves for the control thread.
@@ -47,12 +48,9 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
   transport.subscribe(io::channel::kUserCommand, [&](io::Bytes bytes) { Inbox::put(inbox.user_command, bytes); });
   transport.subscribe(io::channel::kStop, [&](io::Bytes bytes) { Inbox::put(inbox.stop, bytes); });
   std::thread receiver([&] {
-    std::int64_t next_info_ns = 0;
+    platform::EverySecond info_pace;
     while (!stop.load(std::memory_order_relaxed)) {
-      if (platform::monotonic_ns() >= next_info_ns) {
-        transport.publish(io::channel::kRunInfo, run_info);
-        next_info_ns = platform::monotonic_ns() + kRunInfoPeriodNs;
-      }
+      if (info_pace.due()) transport.publish(io::channel::kRunInfo, run_info);
       transport.handle(100);
     }
   });
@@ -65,6 +63,7 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
   };
 
   const auto phase_ns = static_cast<std::int64_t>(config.phase * 1e9);
+  const auto state_wait_ns = static_cast<std::int64_t>(config.state_wait * 1e9);
   WallClock clock;
   io::Timing& timing = clock.timing();
   io::Message timing_message;
@@ -84,9 +83,15 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
     }
     while (!stop.load(std::memory_order_relaxed) && platform::monotonic_ns() < deadline_ns)
       platform::sleep_until(deadline_ns);
-    clock.start();
-    timing.wake_latency_us = static_cast<double>(timing.start_utime) - static_cast<double>(deadline_ns) * 1e-3;
+    timing.wake_latency_us = static_cast<double>(platform::monotonic_ns() - deadline_ns) * 1e-3;
     take_messages();
+    // A state a little late is better than none.
+    while (!ticker.has_new_state() && platform::monotonic_ns() < deadline_ns + state_wait_ns &&
+           !stop.load(std::memory_order_relaxed)) {
+      platform::sleep_until(platform::monotonic_ns() + kStatePollNs);
+      take_messages();
+    }
+    clock.start();
     timing.state_age_us = static_cast<double>(timing.start_utime) - static_cast<double>(ticker.state().utime);
     ticker.tick(periods, clock);
     transport.publish(io::channel::kForcePlan, ticker.plan().bytes());

@@ -3,14 +3,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "controller/platform/hash.hpp"
+
 namespace stance::loop {
 namespace {
-
-std::uint64_t combined(const std::array<std::uint64_t, 3>& hashes) noexcept {
-  std::uint64_t value = io::kHashSeed;
-  for (const std::uint64_t hash : hashes) value = (value ^ hash) * 1099511628211ULL;
-  return value;
-}
 
 constexpr std::uint64_t kPeriodUs = 10'000;
 static_assert(kPeriodUs * 1e-6 == kControlPeriod);
@@ -22,21 +18,26 @@ int periods_between(std::int64_t utime, std::int64_t next_utime) noexcept {
   return static_cast<int>(std::clamp(periods, 1.0, 1e6));
 }
 
+std::uint64_t consumed_hash(std::uint64_t state, std::uint64_t user_command, std::uint64_t stop) noexcept {
+  std::uint64_t hash = platform::kHashSeed;
+  for (const std::uint64_t part : {state, user_command, stop}) hash = platform::hash_step(hash, part);
+  return hash;
+}
+
 bool Ticker::offer_state(io::Bytes bytes) noexcept {
-  const std::int64_t run_id = input_.state.run_id, seq = input_.state.seq;
   if (!io::decode(bytes, input_.state)) return false;
-  if (starts_run(run_id, seq, input_.state)) start_run();
   consumed_.state_is_new = true;
-  state_hash_ = io::hash(bytes);
+  state_hash_ = platform::hash(bytes);
   return true;
 }
 
-void Ticker::start_run() noexcept {
+void Ticker::end_run() noexcept {
   if (user_command_hash_ == 0) {
     input_.user_command = UserCommand{};
     consumed_.user_command_seq = 0;
   }
-  if (stop_hash_ == 0) {
+  // A sender that counts from 1 again under the same id may be a message gone astray: no reason to undo a stop.
+  if (stop_hash_ == 0 && input_.state.run_id != header_.run_id) {
     input_.operator_stop = false;
     consumed_.stop_seq = 0;
   }
@@ -45,7 +46,7 @@ void Ticker::start_run() noexcept {
 bool Ticker::offer_user_command(io::Bytes bytes) noexcept {
   if (!io::decode(bytes, input_.user_command)) return false;
   consumed_.user_command_seq = input_.user_command.seq;
-  user_command_hash_ = io::hash(bytes);
+  user_command_hash_ = platform::hash(bytes);
   return true;
 }
 
@@ -54,13 +55,14 @@ bool Ticker::offer_stop(io::Bytes bytes) noexcept {
   if (!io::decode(bytes, stop)) return false;
   input_.operator_stop = true;
   consumed_.stop_seq = stop.seq;
-  stop_hash_ = io::hash(bytes);
+  stop_hash_ = platform::hash(bytes);
   return true;
 }
 
 void Ticker::tick(int periods, StageClock& clock) noexcept {
+  if (starts_run(header_.run_id, header_.state_seq, input_.state)) end_run();
   consumed_.periods = periods;
-  consumed_.hash = combined({state_hash_, user_command_hash_, stop_hash_});
+  consumed_.hash = consumed_hash(state_hash_, user_command_hash_, stop_hash_);
   late_periods_ = consumed_.state_is_new ? 0 : late_periods_ + periods;
   input_.state_is_new = consumed_.state_is_new;
   input_.periods = periods;

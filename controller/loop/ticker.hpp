@@ -13,6 +13,9 @@ using TickFunction = std::function<void(const TickInput&, StageClock&, TickOutpu
 /// Control periods from one state's stamp to the next one's, at least 1.
 int periods_between(std::int64_t utime, std::int64_t next_utime) noexcept;
 
+/// Consumed::hash, from the hashes of the messages that a tick took anew, 0 for none.
+std::uint64_t consumed_hash(std::uint64_t state, std::uint64_t user_command, std::uint64_t stop) noexcept;
+
 class Ticker {
  public:
   explicit Ticker(TickFunction tick) : tick_(std::move(tick)) {}
@@ -37,7 +40,7 @@ class Ticker {
 
  private:
   /// What earlier ticks consumed ends with their run; what came since may be the new run's, and stays.
-  void start_run() noexcept;
+  void end_run() noexcept;
 
   TickFunction tick_;
   TickInput input_;

@@ -17,7 +17,7 @@ void FaultLadderConfig::validate() const {
 
 FaultLadder::FaultLadder(const FaultLadderConfig& config) : config_(config) { config_.validate(); }
 
-SafetyMode FaultLadder::step(int periods) noexcept {
+SafetyMode FaultLadder::step(int periods, bool can_hold) noexcept {
   constexpr std::uint32_t latching = bit(Fault::kRobotFallen) | bit(Fault::kOperatorStop);
   constexpr std::uint32_t passing = bit(Fault::kStateStale) | bit(Fault::kStateInvalid) | bit(Fault::kQpFailed);
   constexpr double rounding = 1e-9;
@@ -38,7 +38,7 @@ SafetyMode FaultLadder::step(int periods) noexcept {
     next = SafetyMode::kDamp;
   } else if ((finished_faults_ & passing) == 0) {
     next = SafetyMode::kRun;
-  } else if (mode_ == SafetyMode::kRun && config_.hold_time > 0.0) {
+  } else if (mode_ == SafetyMode::kRun && can_hold && config_.hold_time > 0.0) {
     next = SafetyMode::kHold;
   } else if (mode_ == SafetyMode::kRun || time_in_mode_ >= config_.hold_time - rounding) {
     next = SafetyMode::kDamp;

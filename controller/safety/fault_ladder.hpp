@@ -1,7 +1,8 @@
 #pragma once
 // From faults to what the robot does about them: run -> hold -> damp -> stop.
 //
-//   state stale or invalid, QP failed   hold the last plan for at most hold_time, then damp; run again when it is over
+//   state stale or invalid, QP failed   hold the last plan, where there is one, for at most hold_time, then damp; run
+//                                       again when it is over
 //   robot fallen, operator's stop       damp at once, and stay
 //   damped for damp_time                stop: no torque, until a new run
 #include <array>
@@ -24,8 +25,9 @@ class FaultLadder {
   /// Notes a fault of this tick; each kind counts once a tick.
   void report(Fault fault) noexcept { faults_ |= bit(fault); }
 
-  /// Ends the tick: counts its faults, and decides. `periods` control periods have passed since the last call.
-  SafetyMode step(int periods) noexcept;
+  /// Ends the tick: counts its faults, and decides. `periods` control periods have passed since the last call;
+  /// `can_hold`: is there a plan to hold?
+  SafetyMode step(int periods, bool can_hold = true) noexcept;
 
   SafetyMode mode() const noexcept { return mode_; }
   /// No good tick leads back to run: the robot fell, the operator stopped it, or it stopped.

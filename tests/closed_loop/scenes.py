@@ -18,7 +18,7 @@ import lcm
 from stance.network import LCM_URL
 from stance.programs import find_lcm_tool, find_program
 from stance.run import RunRequest, record
-from stance_msgs import controller_trace_t, truth_t
+from stance_msgs import controller_trace_t, stop_t, truth_t, user_command_t
 
 LOCKSTEP_DURATION = 9.0  # s: past the demo's first push
 REAL_TIME_DURATION = 3.0  # s
@@ -58,6 +58,39 @@ def lockstep_with_false_truth(out: Path) -> dict[str, Any]:
         done.set()
         liar.join()
     return {**result, "lies": sent}
+
+
+def two_runs(out: Path) -> dict[str, Any]:
+    """One controller, two simulators one after the other; user commands that come again, and a stop."""
+    out.mkdir(parents=True)
+    log = out / "run.lcmlog"
+    logger = subprocess.Popen([str(find_lcm_tool("lcm-logger")), "--quiet", f"--lcm-url={LCM_URL}", str(log)])
+    controller = subprocess.Popen([str(find_program("stance-controller")), "--robot", "biped", "--lockstep"])
+    time.sleep(1.0)
+    listener = Listener()
+    ticks = 0
+    for run_id in (5, 6):
+        words = ["--robot", "biped", "--scenario", "stand", "--lockstep", "--duration", "3", "--run-id", str(run_id)]
+        simulator = subprocess.Popen([str(find_program("stance-sim")), *words], stderr=subprocess.DEVNULL)
+        for height in (-0.02, -0.03, -0.03):
+            listener.wait(lambda: bool(listener.trace and listener.trace.run_id == run_id), 20)  # noqa: B023
+            command = user_command_t()
+            command.seq, command.height_offset = 9, height - 0.01 * run_id
+            listener.network.publish("USER_COMMAND", command.encode())
+            listener.trace = None
+        listener.wait(lambda: bool(listener.trace and listener.trace.run_id == run_id), 20)  # noqa: B023
+        stop = stop_t()
+        stop.seq = run_id
+        listener.network.publish("STOP", stop.encode())
+        listener.wait(lambda: bool(listener.trace and listener.trace.stop_seq == run_id), 20)  # noqa: B023
+        simulator.wait(timeout=60)
+        listener.wait(lambda: False, 0.2)
+        ticks = listener.trace.seq if listener.trace else 0
+    time.sleep(0.5)
+    for process in (controller, logger):
+        process.send_signal(signal.SIGINT)
+        process.wait(timeout=10)
+    return {"log": str(log), "ticks": ticks}
 
 
 def real_time(out: Path) -> dict[str, Any]:
@@ -154,6 +187,7 @@ if __name__ == "__main__":
         "lockstep": lockstep,
         "lockstep_with_false_truth": lockstep_with_false_truth,
         "real_time": real_time,
+        "two_runs": two_runs,
         "kill_controller": kill_controller,
         "kill_logger": kill_logger,
     }[sys.argv[1]]

@@ -89,6 +89,13 @@ def test_a_log_replays_bit_for_bit(lockstep: Path, rollout: Path, tmp_path: Path
         assert " 0 differ" in done.stdout
 
 
+def test_two_runs_of_one_controller_with_commands_and_stops_replay(tmp_path: Path) -> None:
+    result = play("two_runs", tmp_path / "two")
+    done = verify(Path(result["log"]), capture=True)
+    assert done.returncode == 0, done.stdout
+    assert f"{result['ticks']} of {result['ticks']} ticks" in done.stdout
+
+
 def test_a_changed_state_does_not_replay(rollout: Path, tmp_path: Path) -> None:
     """The verification can fail: one bit of one sensor is enough."""
     import lcm

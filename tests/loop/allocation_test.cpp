@@ -28,7 +28,7 @@ TEST_CASE("AThousandTicksWithPushesAndFaultsMakeNoHeapCall") {
   const ByteVector invalid_state = bytes_of(invalid);
   stance_msgs::user_command_t wish{};
   wish.seq = 1;
-  wish.height_offset = 0.01;
+  wish.height_offset = -0.01;
   const ByteVector command = bytes_of(wish);
   const ByteVector stop = bytes_of(stance_msgs::stop_t{});
 

@@ -18,6 +18,7 @@
 #include <vector>
 
 #include "controller/io/run_info.hpp"
+#include "controller/platform/hash.hpp"
 #include "tests/loop/biped_rig.hpp"
 
 namespace stance::io {
@@ -434,24 +435,21 @@ TEST_CASE("TheTickOfACommandAndAPlanIsToldOnItsOwnChannelOnly") {
 }
 
 TEST_CASE("TheHashIsFnv1aOf64Bits") {
-  const auto of = [](const std::string& text) {
-    return hash(Bytes(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
-  };
-  CHECK(of("") == kHashSeed);
-  CHECK(of("a") == 0xaf63dc4c8601ec8cULL);
-  CHECK(of("foobar") == 0x85944171f73967e8ULL);
+  CHECK(platform::hash("") == platform::kHashSeed);
+  CHECK(platform::hash("a") == 0xaf63dc4c8601ec8cULL);
+  CHECK(platform::hash("foobar") == 0x85944171f73967e8ULL);
 }
 
 TEST_CASE("TheHashChangesWithEachByteAndChains") {
   const ByteVector bytes = bytes_of(distinct_state());
-  std::set<std::uint64_t> seen{hash(bytes)};
+  std::set<std::uint64_t> seen{platform::hash(bytes)};
   for (std::size_t i = 0; i < bytes.size(); ++i) {
     ByteVector changed = bytes;
     changed[i] ^= 1;
-    CHECK(seen.insert(hash(changed)).second);
+    CHECK(seen.insert(platform::hash(changed)).second);
   }
   const Bytes all(bytes);
-  CHECK(hash(all.subspan(100), hash(all.first(100))) == hash(all));
+  CHECK(platform::hash(all.subspan(100), platform::hash(all.first(100))) == platform::hash(all));
 }
 
 TEST_CASE("ARunInfoComesBackAndAPartOfOneDoesNot") {

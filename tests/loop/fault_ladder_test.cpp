@@ -46,6 +46,16 @@ TEST_CASE("APassingFaultHoldsForHoldTimeThenDampsForDampTimeThenStops") {
   }
 }
 
+TEST_CASE("WhereThereIsNothingToHoldItDampsAtOnce") {
+  for (const Fault fault : kPassing) {
+    CAPTURE(static_cast<int>(fault));
+    FaultLadder ladder(kConfig);
+    ladder.report(fault);
+    CHECK(ladder.step(1, false) == SafetyMode::kDamp);
+    CHECK(ladder.step(1, true) == SafetyMode::kRun);
+  }
+}
+
 TEST_CASE("MissedPeriodsCountAsTimeInTheMode") {
   FaultLadder ladder(kConfig);
   CHECK(tick(ladder, Fault::kStateStale) == SafetyMode::kHold);

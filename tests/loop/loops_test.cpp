@@ -118,7 +118,7 @@ ByteVector stop_message(std::int64_t seq) {
 ByteVector user_command(std::int64_t seq) {
   stance_msgs::user_command_t message{};
   message.seq = seq;
-  message.height_offset = 0.01;
+  message.height_offset = -0.01;
   return bytes_of(message);
 }
 
@@ -288,6 +288,38 @@ TEST_CASE("InRealTimeEveryTickNamesAStateAndAnswersComeInOrder") {
   CHECK(traces.back().stop_seq == 4);
   CHECK(commands.back().mode == 1);
   CHECK(bench.count(io::channel::kRunInfo) >= 1);
+}
+
+TEST_CASE("InRealTimeATickWaitsForAStateThatIsLate") {
+  constexpr std::size_t num_states = 10;
+  const std::vector<ByteVector> states = test::recorded_states(test::quiet_stand(), num_states, kRun);
+  Bench bench;
+  const Watchdog watchdog(bench.stop);
+  std::atomic<std::size_t> answered{0};
+  std::atomic<bool> listening{false};
+  bench.on(io::channel::kTrace, [&] { ++answered; });
+  bench.on(io::channel::kRunInfo, [&] { listening = true; });
+  // Each state comes some periods after its deadline.
+  std::thread sender([&] {
+    while (!listening && !bench.stop) std::this_thread::sleep_for(kPeriod / 10);
+    for (std::size_t k = 0; k < num_states && !bench.stop; ++k) {
+      bench.send_state(states[k]);
+      while (answered <= k && !bench.stop) std::this_thread::sleep_for(kPeriod / 10);
+      std::this_thread::sleep_for(3 * kPeriod);
+    }
+    bench.stop = true;
+  });
+  run_real_time(bench.ticker, bench.transport, bench.run_info, {.state_wait = 2.0 * kPatience.count()}, bench.stop);
+  sender.join();
+  while (bench.transport.handle(0)) continue;
+
+  const auto traces = bench.all<controller_trace_t>(io::channel::kTrace);
+  REQUIRE(traces.size() >= num_states);  // and one more where it was stopped as it waited
+  for (std::size_t k = 0; k < num_states; ++k) {
+    CAPTURE(k);
+    CHECK(traces[k].state_is_new == 1);
+    CHECK(traces[k].state_seq == static_cast<std::int64_t>(k + 1));
+  }
 }
 
 TEST_CASE("InRealTimeAStampFromAnotherClockIsAnsweredToo") {
