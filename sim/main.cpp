@@ -24,8 +24,9 @@ void print_summary(const stance::sim::Simulator& simulator, const stance::sim::N
   }
   std::fprintf(stderr, "; drives damped %lld times", static_cast<long long>(report.times_damped));
   if (real_time) {
-    std::fprintf(stderr, "; %lld instants late, worst by %.2f ms", static_cast<long long>(report.late_instants),
-                 report.worst_lateness * 1e3);
+    std::fprintf(stderr, "; %lld instants late, worst by %.2f ms; %lld periods slipped",
+                 static_cast<long long>(report.late_instants), report.worst_lateness * 1e3,
+                 static_cast<long long>(report.slipped_periods));
   }
   std::fprintf(stderr, "\n");
 }

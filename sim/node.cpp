@@ -40,6 +40,14 @@ std::string hash_of(std::initializer_list<std::string_view> texts) {
   return digits.data();
 }
 
+/// ns past `instant_ns` when it is over.
+std::int64_t wait_until(std::int64_t instant_ns, const std::atomic<bool>& stop) noexcept {
+  while (!stop.load(std::memory_order_relaxed) && platform::monotonic_ns() < instant_ns) {
+    platform::sleep_until(instant_ns);
+  }
+  return platform::monotonic_ns() - instant_ns;
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> encode_run_info(const config::RobotDescription& robot, const Scenario& scenario,
@@ -166,19 +174,26 @@ NodeReport Node::run_lockstep(std::int64_t periods, const LockstepTiming& timing
 NodeReport Node::run_real_time(std::int64_t periods, std::int64_t start_ns, const std::atomic<bool>& stop) {
   constexpr auto deadline_after = static_cast<std::int64_t>(kCommandDeadline * 1e9);
   constexpr auto answer_time = static_cast<std::int64_t>(kAnswerTime * 1e9);
+  constexpr auto max_lateness = static_cast<std::int64_t>(kMaxLateness * 1e9);
   constexpr auto late = static_cast<std::int64_t>(kLate * 1e9);
   housekeeping();
   for (std::int64_t k = 0; k < periods; ++k) {
-    const std::int64_t instant = start_ns + k * kPeriodNs;
-    while (!stop.load(std::memory_order_relaxed) && platform::monotonic_ns() < instant) platform::sleep_until(instant);
+    std::int64_t instant = start_ns + k * kPeriodNs;
+    std::int64_t lateness = wait_until(instant, stop);
+    if (lateness > late) ++report_.late_instants;
+    report_.worst_lateness = std::max(report_.worst_lateness, static_cast<double>(lateness) * 1e-9);
+    while (lateness > max_lateness) {
+      const std::int64_t slip = (lateness - max_lateness) / kPeriodNs + 1;
+      report_.slipped_periods += slip;
+      start_ns += slip * kPeriodNs;
+      instant += slip * kPeriodNs;
+      lateness = wait_until(instant, stop);
+    }
     if (stop.load(std::memory_order_relaxed)) {
       report_.ending = Ending::kStopped;
       return report_;
     }
-    const std::int64_t lateness = platform::monotonic_ns() - instant;
     publish_instant();
-    if (lateness > late) ++report_.late_instants;
-    report_.worst_lateness = std::max(report_.worst_lateness, static_cast<double>(lateness) * 1e-9);
     housekeeping();
     take_messages_until(std::max(instant + deadline_after, platform::monotonic_ns() + answer_time), stop);
     simulator_.advance();

@@ -4,9 +4,10 @@
 // Lockstep: the next instant comes when the JOINT_COMMAND that answers the state has arrived; the controller sends its
 // FORCE_PLAN before it. Without an answer the same bytes of the state go out again and again, and silence ends the run.
 // Real time: instants stand on an absolute grid of the monotonic clock. What has arrived by kCommandDeadline after an
-// instant counts as given at it (later where the machine made the instant itself late: each state leaves kAnswerTime for
-// its answer), then the whole period is computed at once; the simulator never waits for a command. So a run whose every
-// command is on time equals the lockstep run, bit for bit.
+// instant counts as given at it, then the whole period is computed at once; the simulator never waits for a command. So
+// a run whose every command is on time equals the lockstep run, bit for bit. Where the machine stalls, the robot must not
+// fall for it: an instant that is late still leaves kAnswerTime for its answer, and one later than kMaxLateness moves to
+// the grid's next point, with all that follow; simulated time then falls behind the clock by whole periods.
 #include <atomic>
 #include <cstdint>
 #include <lcm/lcm-cpp.hpp>
@@ -37,6 +38,7 @@ struct NodeReport {
   Ending ending = Ending::kCompleted;
   std::int64_t times_damped = 0;   ///< times that the drives began to damp for want of a command
   std::int64_t late_instants = 0;  ///< real time: instants more than kLate behind the grid
+  std::int64_t slipped_periods = 0;  ///< real time: by which simulated time fell behind the clock
   double worst_lateness = 0.0;     ///< s
 };
 
@@ -45,6 +47,7 @@ class Node {
   static constexpr double kCommandDeadline = 0.008;  ///< s after an instant
   static constexpr double kAnswerTime = 0.005;       ///< s, at least, from a state's sending
   static constexpr double kLate = 0.001;             ///< s
+  static constexpr double kMaxLateness = 0.004;      ///< s
 
   /// Subscribes. `run_info` is published at the start and each second.
   Node(lcm::LCM& lcm, Simulator& simulator, std::vector<std::uint8_t> run_info);
