@@ -12,7 +12,7 @@ namespace stance {
 loop::TickFunction compose(const config::RobotDescription& robot) {
   if (robot.name == "biped") {
     auto controller = std::make_shared<behaviours::BipedController>(
-        config::biped_config_from_yaml(robot.yaml_text), robot.model, robot.feet, robot.nominal_joint_position);
+        config::biped_config(robot), robot.model, robot.feet, robot.nominal_joint_position);
     return [controller](const TickInput& input, StageClock& clock, TickOutput& out) {
       controller->step(input, clock, out);
     };

@@ -13,18 +13,21 @@ stamp() { cat "$@" | sha256sum | cut -d' ' -f1; }
 done_before() { local name=$1; shift; [ "$(cat ".setup/$name" 2>/dev/null)" = "$(stamp "$@")" ]; }
 mark_done() { local name=$1; shift; stamp "$@" > ".setup/$name"; }
 
-as_root() {
-  if [ "$(id -u)" = 0 ]; then "$@"
-  elif command -v sudo >/dev/null; then sudo "$@"
-  else fail "needs root to install Debian packages ($*): run as root, or install sudo"; fi
-}
+# Checked before the first install: what as_root runs has its output in a log.
+need_root() { [ "$(id -u)" = 0 ] || command -v sudo >/dev/null || fail "needs root to install $*: run as root, or install sudo"; }
+as_root() { if [ "$(id -u)" = 0 ]; then "$@"; else sudo "$@"; fi; }
 
 # ---- Debian packages -------------------------------------------------------------------------------------------
 is_installed() { [ "$(dpkg-query -W -f '${Status}' "$1" 2>/dev/null)" = "install ok installed" ]; }
 version_at_least() { dpkg --compare-versions "$(dpkg-query -W -f '${Version}' "$1" 2>/dev/null || echo 0)" ge "$2"; }
 apt_log=.setup/apt.log
 apt() { as_root env DEBIAN_FRONTEND=noninteractive apt-get -qq -o Dpkg::Use-Pty=0 "$@" >>"$apt_log" 2>&1; }
-apt_update() { [ -n "${apt_updated:-}" ] || apt update || fail "apt-get update failed: see $apt_log; check the network"; apt_updated=1; }
+# Without Error-Mode, an update that fetched nothing counts as a success.
+apt_update() {
+  [ -n "${apt_updated:-}" ] || apt -o APT::Update::Error-Mode=any update || fail "apt-get update failed: check the network and this machine's Debian sources; see $apt_log"
+  apt_updated=1
+}
+is_known() { apt-cache show "$1" >/dev/null 2>&1; }
 
 # Debian 12 carries Catch2 2; its backports carry 3. The extra source is this machine's own, with the suite renamed.
 enable_backports() {
@@ -47,18 +50,20 @@ install_debian() {
   command -v cargo >/dev/null || [ -d "${STANCE_OSQP_SOURCE_DIR:-third_party/osqp}" ] || missing+=(cargo)
   : > "$apt_log"
   if [ ${#missing[@]} -gt 0 ]; then
+    need_root "${missing[*]}"
     apt_update
     # Debian 12's own cargo is too old for the sparse protocol; cargo-web is the newer one, for the same use.
     local wanted=()
     for package in "${missing[@]}"; do
-      [ "$package" = cargo ] && apt-cache show cargo-web >/dev/null 2>&1 && package=cargo-web
-      apt-cache show "$package" >/dev/null 2>&1 || package=${package}t64
+      [ "$package" = cargo ] && is_known cargo-web && package=cargo-web
+      is_known "$package" || ! is_known "${package}t64" || package=${package}t64
       wanted+=("$package")
     done
     say "installing ${wanted[*]}"
     apt install --no-install-recommends -y "${wanted[@]}" || fail "apt-get install ${wanted[*]} failed: see $apt_log"
   fi
   if ! version_at_least catch2 3; then
+    need_root "Catch2 3"
     say "installing Catch2 3"
     apt_update
     if ! apt-cache madison catch2 | awk '{ print $3 }' | grep -q '^3'; then
@@ -98,6 +103,8 @@ vendor_osqp() {
   say "fetching OSQP (crate osqp-sys $OSQP_CRATE_VERSION)"
   (cd "$work" && cargo vendor --quiet vendor >/dev/null) || fail "cargo vendor could not fetch osqp-sys $OSQP_CRATE_VERSION: check the network, or set STANCE_OSQP_SOURCE_DIR to an OSQP 1.0 source tree"
   grep -q "\"package\":\"$OSQP_CRATE_SHA256\"" "$work/vendor/osqp-sys/.cargo-checksum.json" || fail "osqp-sys $OSQP_CRATE_VERSION has not the pinned sha256: do not use it"
+  # Older cargos leave hidden files out; nothing builds with them, so they go everywhere.
+  find "$work/vendor/osqp-sys/osqp" -mindepth 1 -name '.*' -prune -exec rm -rf {} +
   local found; found=$(tree_hash "$work/vendor/osqp-sys/osqp")
   [ "$found" = "$OSQP_TREE_SHA256" ] || fail "the OSQP source tree hashes to $found, not to the pinned $OSQP_TREE_SHA256: do not use it"
   rm -rf third_party/osqp; mv "$work/vendor/osqp-sys/osqp" third_party/osqp; rm -rf "$work"

@@ -3,8 +3,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "controller/config/strict_yaml.hpp"
-
 namespace stance::sim {
 namespace {
 
@@ -28,21 +26,6 @@ bool in_range(const joint_command_t& command, std::int64_t present_state_seq) no
 }
 
 }  // namespace
-
-DriveConfig drive_config(const config::RobotDescription& robot) {
-  config::StrictYaml yaml = config::StrictYaml::parse(robot.yaml_text, robot.name + ".yaml");
-  config::StrictYaml drives = yaml.mapping("drives");
-  DriveConfig out;
-  const auto damping = drives.numbers("damping", robot.model.num_joints);
-  for (int i = 0; i < robot.model.num_joints; ++i) {
-    out.damping[i] = damping[static_cast<std::size_t>(i)];
-    if (out.damping[i] < 0.0) drives.fail("damping", "has a negative entry");
-  }
-  out.command_timeout = drives.number("command_timeout");
-  if (out.command_timeout < kControlPeriod) drives.fail("command_timeout", "is shorter than a control period");
-  drives.finish();
-  return out;
-}
 
 JointVector drive_torque(const rigid_body::Model& model, const joint_command_t& command, const JointVector& q,
                          const JointVector& qd) noexcept {

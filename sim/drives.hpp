@@ -13,14 +13,6 @@
 
 namespace stance::sim {
 
-/// The `drives` section of robots/<robot>/<robot>.yaml.
-struct DriveConfig {
-  JointVector damping = JointVector::Zero();  ///< N m s/rad, of each joint while there is no valid command
-  double command_timeout = 0.0;               ///< s
-};
-/// Throws config::ConfigError.
-DriveConfig drive_config(const config::RobotDescription& robot);
-
 /// Torques of `command` at (q, qd).
 JointVector drive_torque(const rigid_body::Model& model, const stance_msgs::joint_command_t& command,
                          const JointVector& q, const JointVector& qd) noexcept;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <span>
 
 namespace stance::sim {
 namespace {
@@ -90,16 +91,9 @@ Simulator::Simulator(const config::RobotDescription& robot, const Scenario& scen
       scenario_(scenario),
       options_(options),
       num_contacts_(robot.feet.size()),
-      drives_(drive_config(robot)),
-      timeout_steps_(std::lround(drives_.command_timeout / kPhysicsStep)),
+      timeout_steps_(std::lround(robot.drives.command_timeout / kPhysicsStep)),
       gate_(options.run_id, robot.model.num_joints, timeout_steps_ / kStepsPerPeriod) {
   robot_.model = with_mass_factors(robot_.model, scenario_.trunk_mass_factor, scenario_.leg_mass_factor);
-  if (num_contacts_ > 0) {
-    config::StrictYaml safety =
-        config::StrictYaml::parse(robot_.yaml_text, robot_.name + ".yaml").mapping("controller").mapping("safety");
-    min_upright_ = safety.number("min_upright");
-    min_height_ = safety.number("min_height");
-  }
   WorldSetup setup;
   setup.model = robot_.model;
   setup.feet = robot_.feet;
@@ -174,16 +168,11 @@ Wrench Simulator::push_wrench(const rigid_body::State& state, double now) const 
   return wrench;
 }
 
-AppliedForces Simulator::planned_forces() const noexcept {
-  AppliedForces forces;
-  forces.force_W.fill(Vector3::Zero());
-  forces.p_WF.fill(Vector3::Zero());
-  if (!plans_.valid(step_, timeout_steps_)) return forces;
-  for (std::size_t i = 0; i < num_contacts_; ++i) {
-    forces.force_W[i] = vector(plans_.current.force[0][i]);
-    forces.p_WF[i] = vector(plans_.current.p_WF[i]);
-  }
-  return forces;
+ContactVectors Simulator::planned_forces() const noexcept {
+  ContactVectors force_W = zero_contact_vectors();
+  if (!plans_.valid(step_, timeout_steps_)) return force_W;
+  for (std::size_t i = 0; i < num_contacts_; ++i) force_W[i] = vector(plans_.current.force[0][i]);
+  return force_W;
 }
 
 void Simulator::step(Sums& sums) {
@@ -195,7 +184,7 @@ void Simulator::step(Sums& sums) {
   const Wrench push = push_wrench(before, static_cast<double>(step_) * kPhysicsStep);
   JointVector torque = JointVector::Zero();
   if (world_) {
-    torque = drives_damped_ ? damping_torque(robot_.model, drives_.damping, before.qd)
+    torque = drives_damped_ ? damping_torque(robot_.model, robot_.drives.damping, before.qd)
                             : drive_torque(robot_.model, commands_.current, before.q, before.qd);
     world_->step(torque, push);
   } else {
@@ -221,11 +210,10 @@ void Simulator::advance() {
 bool Simulator::has_fallen() const noexcept {
   if (num_contacts_ == 0) return false;
   if (truth_.fallen != 0 || body_was_on_ground_) return true;
-  double lowest = truth_.p_WF[0][2];
-  for (std::size_t i = 1; i < num_contacts_; ++i) lowest = std::min(lowest, truth_.p_WF[i][2]);
   const rigid_body::State now = plant([](const auto& p) { return p.state(); });
-  // Written so that a state that is not a number has fallen, too.
-  return !(now.R_WB(2, 2) >= min_upright_ && now.p_WB.z() - lowest >= min_height_);
+  const ContactVectors tips = plant([](const auto& p) { return p.foot_tips_W(); });
+  return kinematics::has_fallen(robot_.fallen, now.R_WB, now.p_WB, std::span(tips).first(num_contacts_),
+                                robot_.feet.front().radius);
 }
 
 void Simulator::write_messages(const Sums& sums) noexcept {

@@ -86,7 +86,7 @@ class Simulator {
   auto plant(Read read) const {
     return world_ ? read(*world_) : read(*single_body_);
   }
-  AppliedForces planned_forces() const noexcept;
+  ContactVectors planned_forces() const noexcept;
   static Sums no_sums() noexcept;
   void step(Sums& sums);
   Wrench push_wrench(const rigid_body::State& state, double time) const noexcept;
@@ -97,10 +97,7 @@ class Simulator {
   Scenario scenario_;
   SimulatorOptions options_;
   std::size_t num_contacts_;
-  DriveConfig drives_;
   std::int64_t timeout_steps_;
-  double min_upright_ = 0.0;    // fallen below: z component of the trunk's z axis
-  double min_height_ = 0.0;     // m, of the trunk over its lowest foot
   std::optional<World> world_;  // one of these two is the plant
   std::optional<SingleBody> single_body_;
   std::optional<Sensors> sensors_;

@@ -22,7 +22,8 @@ WorldSetup as_one_body(const WorldSetup& setup) {
   WorldSetup one;
   one.model.name = setup.model.name;
   one.model.total_mass = whole.mass;
-  one.model.bodies[0] = {setup.model.name, whole.mass, Vector3::Zero(), whole.inertia_W};
+  one.model.bodies[0] = {setup.model.name, whole.mass, Vector3::Zero(),
+                         kinematics::standing_inertia(setup.model, setup.feet, setup.initial.q)};
   one.floating = true;
   one.initial.R_WB = setup.initial.R_WB;
   one.initial.p_WB = setup.initial.p_WB + setup.initial.R_WB * p_BC;
@@ -43,16 +44,20 @@ SingleBody::SingleBody(const WorldSetup& setup)
   for (std::size_t leg = 0; leg < legs_.size(); ++leg) {
     last_link_pitch_[leg] = setup.initial.q.segment<3>(static_cast<Eigen::Index>(4 * leg + 1)).sum() + pitch;
   }
+  p_WG_ = p_WF_;
+  for (std::size_t i = 0; i < setup.feet.size(); ++i) p_WG_[i].z() -= setup.feet[i].radius;
   foot_force_W_.fill(Vector3::Zero());
   follow();
 }
 
-void SingleBody::step(const AppliedForces& forces, const Wrench& push) {
+void SingleBody::step(const ContactVectors& force_W, const Wrench& push) {
+  const Vector3& p_WC = body_.state().p_WB;
   Wrench total = push;
+  total.moment += (state_.p_WB - p_WC).cross(push.force);
   for (std::size_t i = 0; i < legs_.size(); ++i) {
-    total.force += forces.force_W[i];
-    total.moment += (forces.p_WF[i] - body_.state().p_WB).cross(forces.force_W[i]);
-    foot_force_W_[i] = forces.force_W[i];
+    total.force += force_W[i];
+    total.moment += (p_WG_[i] - p_WC).cross(force_W[i]);
+    foot_force_W_[i] = force_W[i];
   }
   body_.step(JointVector::Zero(), total);
   follow();

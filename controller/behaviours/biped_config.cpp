@@ -25,11 +25,13 @@ void BipedConfig::validate() const {
   require(force_limits.normal_force_min >= 0.0, "force_qp.normal_force_min", force_limits.normal_force_min, ">= 0 N");
   require(force_limits.normal_force_max > force_limits.normal_force_min, "force_qp.normal_force_max",
           force_limits.normal_force_max, "> normal_force_min");
-  require(stand.stages >= 1 && stand.stages <= 100, "stand.stages", stand.stages, "in 1..100");
+  require(stand.stages >= 1 && stand.stages <= kMaxPlanStages, "stand.stages", stand.stages,
+          ("in 1.." + std::to_string(kMaxPlanStages)).c_str());
   require(stand.state_weights.minCoeff() >= 0.0, "stand.state_weights' least", stand.state_weights.minCoeff(), ">= 0");
   require(stand.force_weight > 0.0, "stand.force_weight", stand.force_weight, "> 0");
   require(stand.height_integral_gain >= 0.0, "stand.height_integral_gain", stand.height_integral_gain, ">= 0");
   require(stand.height_integral_limit >= 0.0, "stand.height_integral_limit", stand.height_integral_limit, ">= 0 m");
+  require(stand.height_offset_rate > 0.0, "stand.height_offset_rate", stand.height_offset_rate, "> 0 m/s");
   const auto [lowest, highest] = stand.height_offset_range;
   require(lowest <= 0.0, "stand.height_offset_range's least", lowest, "<= 0 m");
   require(highest >= 0.0, "stand.height_offset_range's greatest", highest, ">= 0 m");
@@ -37,9 +39,6 @@ void BipedConfig::validate() const {
   require(torque_map.null_space_kd >= 0.0, "torque_map.null_space_kd", torque_map.null_space_kd, ">= 0");
   require(torque_map.lead >= 0.0 && torque_map.lead < 0.05, "torque_map.lead", torque_map.lead, "in 0..0.05 s");
   require(com_offset_quiet_momentum > 0.0, "com_offset_observer.quiet_momentum", com_offset_quiet_momentum, "> 0");
-  require(fall.min_upright > 0.0 && fall.min_upright < 1.0, "safety.min_upright", fall.min_upright, "in 0..1");
-  require(fall.min_height > 0.0, "safety.min_height", fall.min_height, "> 0 m");
-  require(damping.minCoeff() >= 0.0, "drives.damping's least", damping.minCoeff(), ">= 0");
 }
 
 }  // namespace stance::behaviours

@@ -3,6 +3,7 @@
 #include "controller/estimation/base_estimator.hpp"
 #include "controller/estimation/com_offset_observer.hpp"
 #include "controller/force_qp/force_qp.hpp"
+#include "controller/kinematics/fallen.hpp"
 #include "controller/safety/fault_ladder.hpp"
 #include "controller/safety/validation.hpp"
 
@@ -20,6 +21,7 @@ struct StandConfig {
   double force_weight = 0.0;                                ///< R's diagonal
   double height_integral_gain = 0.0;                        ///< 1/s
   double height_integral_limit = 0.0;                       ///< m
+  double height_offset_rate = 0.0;                          ///< m/s, at which the height follows the operator's
   std::array<double, 2> height_offset_range{};              ///< m, that an operator may ask for
 };
 
@@ -27,11 +29,6 @@ struct TorqueMapConfig {
   double null_space_kp = 0.0;  ///< 1/s^2
   double null_space_kd = 0.0;  ///< 1/s
   double lead = 0.0;           ///< s, from the state to the middle of its command's effect
-};
-
-struct FallConfig {
-  double min_upright = 0.0;  ///< z component of B's z axis in W
-  double min_height = 0.0;   ///< m, of B over the feet
 };
 
 struct BipedConfig {
@@ -45,7 +42,7 @@ struct BipedConfig {
   TorqueMapConfig torque_map;
   safety::FaultLadderConfig fault_ladder;
   safety::ValidationConfig validation;
-  FallConfig fall;
+  kinematics::FallLimits fallen;
   JointVector damping = JointVector::Zero();  ///< N m s/rad, of the joints while damped
 
   /// Throws std::invalid_argument naming the field, its value and the allowed range.

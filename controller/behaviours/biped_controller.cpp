@@ -1,9 +1,14 @@
 #include "controller/behaviours/biped_controller.hpp"
 
+#include <algorithm>
+#include <cmath>
+#include <span>
 #include <stdexcept>
 
 namespace stance::behaviours {
 namespace {
+
+constexpr double kMaxObserverStep = 0.1;  // s, longest time that one tick observes over
 
 std::array<rigid_body::Foot, 2> two_feet(const std::vector<rigid_body::Foot>& feet) {
   if (feet.size() != 2) {
@@ -34,15 +39,7 @@ Nominal nominal_posture(const rigid_body::Model& model, const std::array<rigid_b
     nominal.r[i] = p_WF - Vector3(0.0, 0.0, feet[i].radius) - centroidal.p_WC;
   }
   nominal.height = -0.5 * (nominal.r[0].z() + nominal.r[1].z());
-  // The feet held, and each leg's last link keeping its pitch in W: its three pitch rates take the trunk's back.
-  rigid_body::ConstraintRows constant_pitch(2, 6 + model.num_joints);
-  constant_pitch.setZero();
-  for (int leg = 0; leg < 2; ++leg) {
-    constant_pitch(leg, 1) = 1.0;
-    constant_pitch.block<1, 3>(leg, 6 + 4 * leg + 1).setOnes();
-  }
-  const Matrix3 inertia = rigid_body::effective_inertia(model, state, kinematics, feet, constant_pitch);
-  nominal.inertia = inertia.diagonal().asDiagonal();
+  nominal.inertia = kinematics::standing_inertia(model, feet, q);
   return nominal;
 }
 
@@ -88,6 +85,8 @@ void BipedController::step(const TickInput& input, StageClock& clock, TickOutput
   Trace& trace = out.trace;
   trace.qp_status = QpStatus::kNotRun;
   trace.qp_iterations = 0;
+  trace.qp_primal_residual = trace.qp_dual_residual = 0.0;
+  trace.qp_active = 0;
   trace.torques_clipped = 0;
   if (fresh) {
     estimate(input.state, trace.estimate);
@@ -138,14 +137,23 @@ bool BipedController::accept(const TickInput& input) noexcept {
     ladder_.report(Fault::kStateStale);
     return false;
   }
-  const bool in_order = state.seq > memory_.state_seq && state.utime > memory_.state_utime;
-  if (!in_order || !safety::state_is_plausible(config_.validation, model_, kFeet, state)) {
+  if (!follows(state) || !safety::state_is_plausible(config_.validation, model_, kFeet, state)) {
     ladder_.report(Fault::kStateInvalid);
     return false;
   }
   memory_.state_seq = state.seq;
   memory_.state_utime = state.utime;
   return true;
+}
+
+bool BipedController::follows(const RobotState& state) const noexcept {
+  if (state.seq <= memory_.state_seq || state.utime <= memory_.state_utime) return false;
+  if (memory_.state_seq == 0) return true;
+  // A number or a stamp far off would make every later state one out of order.
+  constexpr double period_us = kControlPeriod * 1e6;
+  const double periods = static_cast<double>(state.seq) - static_cast<double>(memory_.state_seq);
+  const double elapsed_us = static_cast<double>(state.utime) - static_cast<double>(memory_.state_utime);
+  return std::abs(elapsed_us - periods * period_us) < 0.5 * period_us;
 }
 
 void BipedController::estimate(const RobotState& state, BaseEstimate& base) noexcept {
@@ -157,7 +165,10 @@ void BipedController::estimate(const RobotState& state, BaseEstimate& base) noex
   rigid_body::centroidal(model_, body_.kinematics, body_.centroidal);
   rigid_body::mass_matrix(model_, body_.state, body_.mass_matrix);
   rigid_body::gravity_torques(model_, body_.state, body_.gravity);
-  if (has_fallen(base)) ladder_.report(Fault::kRobotFallen);
+  if (kinematics::has_fallen(config_.fallen, base.R_WB, base.p_WB, std::span(base.p_WF).first<kFeet>(),
+                             feet_[0].radius)) {
+    ladder_.report(Fault::kRobotFallen);
+  }
 }
 
 void BipedController::plan(int periods, Trace& trace) noexcept {
@@ -183,7 +194,7 @@ void BipedController::plan(int periods, Trace& trace) noexcept {
   // A push turns the robot about its feet as an offset would: look only while the robot is quiet.
   seen.standing =
       base.contact[0] && base.contact[1] && body_.centroidal.L_C_W.head<2>().norm() < config_.com_offset_quiet_momentum;
-  where.p_WC = seen.p_WC + observer_.step(seen, kControlPeriod * periods);
+  where.p_WC = seen.p_WC + observer_.step(seen, std::min(kControlPeriod * periods, kMaxObserverStep));
   where.height_offset = memory_.user_command.height_offset;
   where.periods = periods;
   StandOutput reference;
@@ -191,11 +202,6 @@ void BipedController::plan(int periods, Trace& trace) noexcept {
   trace.behaviour = Behaviour::kStand;
   trace.x = reference.x;
   trace.x_ref = reference.x_ref;
-}
-
-bool BipedController::has_fallen(const BaseEstimate& base) const noexcept {
-  const double feet_z = 0.5 * (base.p_WF[0].z() + base.p_WF[1].z()) - feet_[0].radius;
-  return base.R_WB(2, 2) < config_.fall.min_upright || base.p_WB.z() - feet_z < config_.fall.min_height;
 }
 
 void BipedController::give_up(SafetyMode mode, TickOutput& out) const noexcept {

@@ -41,7 +41,7 @@ class BipedController {
   bool accept(const TickInput& input) noexcept;
   void estimate(const RobotState& state, BaseEstimate& base) noexcept;
   void plan(int periods, Trace& trace) noexcept;
-  bool has_fallen(const BaseEstimate& base) const noexcept;
+  bool follows(const RobotState& state) const noexcept;
   /// No forces: what the robot is commanded in DAMP and STOP.
   void give_up(SafetyMode mode, TickOutput& out) const noexcept;
 

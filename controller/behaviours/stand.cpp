@@ -7,7 +7,7 @@ namespace stance::behaviours {
 namespace {
 
 constexpr int kFeet = 2;
-constexpr double kHeightOffsetRate = 0.1;  // m/s, ramp of the operator's height
+constexpr double kMaxStep = 0.1;  // s, longest time that one tick integrates over
 
 /// p, omega and v turned by R; theta as it is.
 CentroidalState rotated(const Matrix3& R, const CentroidalState& x) noexcept {
@@ -57,8 +57,9 @@ void Stand::enter() noexcept {
 }
 
 void Stand::plan(const StandInput& input, StandOutput& out) noexcept {
-  const double dt = kControlPeriod * input.periods;
-  height_offset_ += std::clamp(input.height_offset - height_offset_, -kHeightOffsetRate * dt, kHeightOffsetRate * dt);
+  const double dt = std::min(kControlPeriod * input.periods, kMaxStep);
+  const double offset_step = config_.height_offset_rate * dt;
+  height_offset_ += std::clamp(input.height_offset - height_offset_, -offset_step, offset_step);
   p_WG_ = input.p_WG;
   const Vector3 middle = 0.5 * (p_WG_[0] + p_WG_[1]);
   const double height_ref = middle.z() + nominal_height_ + height_offset_;

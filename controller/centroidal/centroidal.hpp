@@ -21,7 +21,6 @@ using StateVector = CentroidalState;
 using StateMatrix = Eigen::Matrix<double, kStates, kStates>;
 using InputMatrix = Eigen::Matrix<double, kStates, Eigen::Dynamic, 0, kStates, kMaxForces>;
 using ForceVector = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxForces, 1>;
-using ForceMatrix = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxForces, kMaxForces>;
 
 struct Parameters {
   double mass = 0.0;                         ///< kg

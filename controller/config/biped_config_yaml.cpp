@@ -54,6 +54,7 @@ void force_qp(StrictYaml yaml, force_qp::Settings& settings, behaviours::ForceLi
   settings.tolerance = yaml.number("tolerance");
   settings.max_iterations = yaml.integer("max_iterations");
   settings.max_primal_residual = yaml.number("max_primal_residual");
+  settings.max_dual_residual = yaml.number("max_dual_residual");
   limits.friction = yaml.number("friction");
   limits.normal_force_min = yaml.number("normal_force_min");
   limits.normal_force_max = yaml.number("normal_force_max");
@@ -68,6 +69,7 @@ behaviours::StandConfig stand(StrictYaml yaml) {
   c.force_weight = yaml.number("force_weight");
   c.height_integral_gain = yaml.number("height_integral_gain");
   c.height_integral_limit = yaml.number("height_integral_limit");
+  c.height_offset_rate = yaml.number("height_offset_rate");
   const auto range = yaml.numbers("height_offset_range", 2);
   c.height_offset_range = {range[0], range[1]};
   yaml.finish();
@@ -86,8 +88,6 @@ behaviours::TorqueMapConfig torque_map(StrictYaml yaml) {
 void safety(StrictYaml yaml, behaviours::BipedConfig& c) {
   c.fault_ladder.hold_time = yaml.number("hold_time");
   c.fault_ladder.damp_time = yaml.number("damp_time");
-  c.fall.min_upright = yaml.number("min_upright");
-  c.fall.min_height = yaml.number("min_height");
   c.validation.max_angular_velocity = yaml.number("max_angular_velocity");
   c.validation.max_acceleration = yaml.number("max_acceleration");
   c.validation.joint_position_margin = yaml.number("joint_position_margin");
@@ -97,8 +97,8 @@ void safety(StrictYaml yaml, behaviours::BipedConfig& c) {
 
 }  // namespace
 
-behaviours::BipedConfig biped_config_from_yaml(const std::string& yaml_text) {
-  StrictYaml root = StrictYaml::parse(yaml_text, "biped.yaml");
+behaviours::BipedConfig biped_config(const RobotDescription& robot) {
+  StrictYaml root = StrictYaml::parse(robot.yaml_text, "biped.yaml");
   StrictYaml yaml = root.mapping("controller");
   behaviours::BipedConfig c;
   c.last_link_pitch = yaml.number("last_link_pitch");
@@ -109,8 +109,8 @@ behaviours::BipedConfig biped_config_from_yaml(const std::string& yaml_text) {
   c.torque_map = torque_map(yaml.mapping("torque_map"));
   safety(yaml.mapping("safety"), c);
   yaml.finish();
-  const auto damping = root.mapping("drives").numbers("damping", kMaxJoints);
-  c.damping = Eigen::Map<const JointVector>(damping.data());
+  c.damping = robot.drives.damping;
+  c.fallen = robot.fallen;
   try {
     c.validate();
   } catch (const std::invalid_argument& error) {

@@ -5,6 +5,30 @@
 #include <sstream>
 
 namespace stance::config {
+namespace {
+
+DriveDescription drives(StrictYaml yaml, int num_joints) {
+  DriveDescription out;
+  const auto damping = yaml.numbers("damping", num_joints);
+  for (int i = 0; i < num_joints; ++i) {
+    out.damping[i] = damping[static_cast<std::size_t>(i)];
+    if (!(out.damping[i] >= 0.0)) yaml.fail("damping", "has an entry that is not >= 0");
+  }
+  out.command_timeout = yaml.number("command_timeout");
+  if (!(out.command_timeout >= kControlPeriod)) yaml.fail("command_timeout", "is shorter than a control period");
+  yaml.finish();
+  return out;
+}
+
+kinematics::FallLimits fall_limits(StrictYaml yaml) {
+  kinematics::FallLimits out{yaml.number("min_upright"), yaml.number("min_height")};
+  if (!(out.min_upright > 0.0 && out.min_upright < 1.0)) yaml.fail("min_upright", "must be in 0..1");
+  if (!(out.min_height > 0.0)) yaml.fail("min_height", "must be > 0 m");
+  yaml.finish();
+  return out;
+}
+
+}  // namespace
 
 std::string read_text(const std::filesystem::path& file) {
   std::ifstream stream(file);
@@ -47,8 +71,9 @@ RobotDescription robot_from_texts(const std::string& yaml_text, const std::strin
   }
   const auto nominal = yaml.numbers("nominal_joint_position", num_joints);
   for (int i = 0; i < num_joints; ++i) robot.nominal_joint_position[i] = nominal[static_cast<std::size_t>(i)];
+  robot.drives = drives(yaml.mapping("drives"), num_joints);
+  if (!robot.foot_links.empty()) robot.fallen = fall_limits(yaml.mapping("fallen"));
   yaml.leave("controller");
-  yaml.leave("drives");
   yaml.finish();
   try {
     robot.model = rigid_body::model_from_urdf(urdf_text, robot.joint_names);

@@ -1,13 +1,20 @@
 #pragma once
-// What robots/<robot>/ says of a robot's body: the one source of its masses, lengths, limits, joint order and feet.
+// What robots/<robot>/ says of a robot's body: the one source of its masses, lengths, limits, joint order, feet and
+// drives.
 #include <filesystem>
 #include <string>
 #include <vector>
 
 #include "controller/config/strict_yaml.hpp"
+#include "controller/kinematics/fallen.hpp"
 #include "controller/rigid_body/model.hpp"
 
 namespace stance::config {
+
+struct DriveDescription {
+  JointVector damping = JointVector::Zero();  ///< N m s/rad, of DAMP, and without a valid command
+  double command_timeout = 0.0;               ///< s without a valid command after which the drives damp
+};
 
 struct RobotDescription {
   std::string name;
@@ -18,6 +25,8 @@ struct RobotDescription {
   rigid_body::Model model;
   std::vector<rigid_body::Foot> feet;
   JointVector nominal_joint_position = JointVector::Zero();  ///< rad
+  DriveDescription drives;
+  kinematics::FallLimits fallen;  ///< of a robot with feet
 };
 
 /// Whole text of a file. Throws ConfigError naming it where it cannot be read.
@@ -26,7 +35,7 @@ std::string read_text(const std::filesystem::path& file);
 /// robots/<robot>/<robot>.yaml and the URDF that it names. Throws ConfigError.
 RobotDescription load_robot(const std::filesystem::path& robots_directory, const std::string& robot);
 
-/// The same from texts, as a log holds them. The `controller` section is left to controller_config.hpp. Throws
+/// The same from texts, as a log holds them. The `controller` section is left to biped_config_yaml.hpp. Throws
 /// ConfigError.
 RobotDescription robot_from_texts(const std::string& yaml_text, const std::string& urdf_text);
 

@@ -14,8 +14,7 @@ class Transport {
   explicit Transport(const std::string& url);
   ~Transport();
 
-  /// `handler` runs within handle(), and must not throw. Only the newest messages of a channel matter: the queue is
-  /// short.
+  /// `handler` runs within handle(), and must not throw.
   void subscribe(const char* channel, std::function<void(Bytes)> handler);
 
   /// Waits up to `timeout_ms` for one message and hands it over; false where none came.

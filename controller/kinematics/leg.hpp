@@ -61,13 +61,15 @@ enum class LegIkStatus { kOk, kTooFar, kTooNear };
 /// knee entry is not negative. Where the leg is singular, one of the null vectors.
 LegVector null_direction(const LegJacobian& J_foot) noexcept;
 
-/// Rows on nu (rigid_body/dynamics.hpp) of how a biped's legs follow its trunk: a held leg keeps its last link's angle
-/// q1 + q2 + q3 in the leg, another leg its joints. For rigid_body::effective_inertia.
-void leg_constraints(const std::array<bool, 2>& held, rigid_body::ConstraintRows& rows) noexcept;
-
-/// rigid_body::effective_inertia of a biped that stands on the `held` ones of its two feet.
+/// rigid_body::effective_inertia of a biped that stands on the `held` ones of its two feet: a held leg's last link does
+/// not turn about its pitch axis in W, another leg keeps its joints.
 Matrix3 biped_effective_inertia(const rigid_body::Model& model, std::span<const rigid_body::Foot> feet,
                                 const rigid_body::State& state, const rigid_body::Kinematics& kinematics,
                                 const std::array<bool, 2>& held) noexcept;
+
+/// What standing's centroidal model has for inertia [kg m^2, in B]: the diagonal of that on both feet, in posture `q`
+/// with the trunk upright.
+Matrix3 standing_inertia(const rigid_body::Model& model, std::span<const rigid_body::Foot> feet,
+                         const JointVector& q) noexcept;
 
 }  // namespace stance::kinematics

@@ -1,5 +1,6 @@
 // What joins the closed-form leg to the rigid-body model.
 #include <algorithm>
+#include <cmath>
 #include <stdexcept>
 #include <string>
 
@@ -61,32 +62,39 @@ std::array<LegGeometry, 2> leg_geometries(const rigid_body::Model& model, std::s
   return {leg_geometry(model, feet[0], 0), leg_geometry(model, feet[1], kLegJoints)};
 }
 
-void leg_constraints(const std::array<bool, 2>& held, rigid_body::ConstraintRows& rows) noexcept {
+Matrix3 biped_effective_inertia(const rigid_body::Model& model, std::span<const rigid_body::Foot> feet,
+                                const rigid_body::State& state, const rigid_body::Kinematics& kinematics,
+                                const std::array<bool, 2>& held) noexcept {
   const auto num_held = std::count(held.begin(), held.end(), true);
+  rigid_body::ConstraintRows rows;
   rows.setZero(num_held + kLegJoints * (2 - num_held), 6 + 2 * kLegJoints);
+  std::array<rigid_body::Foot, 2> held_feet;
+  std::size_t num_feet = 0;
   int row = 0;
   for (int leg = 0; leg < 2; ++leg) {
     const int first = 6 + kLegJoints * leg;
     if (held[leg]) {
+      held_feet[num_feet++] = feet[leg];
+      const double q0 = state.q[kLegJoints * leg];
+      const Vector3 pitch_axis_W = state.R_WB * Vector3(0.0, std::cos(q0), std::sin(q0));
+      rows.row(row).head<3>() = pitch_axis_W.transpose();
       rows.row(row++).segment<kLegJoints - 1>(first + 1).setOnes();
     } else {
       rows.block<kLegJoints, kLegJoints>(row, first).setIdentity();
       row += kLegJoints;
     }
   }
+  return rigid_body::effective_inertia(model, state, kinematics, std::span(held_feet).first(num_feet), rows);
 }
 
-Matrix3 biped_effective_inertia(const rigid_body::Model& model, std::span<const rigid_body::Foot> feet,
-                                const rigid_body::State& state, const rigid_body::Kinematics& kinematics,
-                                const std::array<bool, 2>& held) noexcept {
-  std::array<rigid_body::Foot, 2> held_feet;
-  std::size_t num_held = 0;
-  for (std::size_t leg = 0; leg < 2; ++leg) {
-    if (held[leg]) held_feet[num_held++] = feet[leg];
-  }
-  rigid_body::ConstraintRows rows;
-  leg_constraints(held, rows);
-  return rigid_body::effective_inertia(model, state, kinematics, std::span(held_feet).first(num_held), rows);
+Matrix3 standing_inertia(const rigid_body::Model& model, std::span<const rigid_body::Foot> feet,
+                         const JointVector& q) noexcept {
+  rigid_body::State state;
+  state.q = q;
+  rigid_body::Kinematics kinematics;
+  rigid_body::forward_kinematics(model, state, kinematics);
+  const Matrix3 inertia = biped_effective_inertia(model, feet, state, kinematics, {true, true});
+  return inertia.diagonal().asDiagonal();
 }
 
 }  // namespace stance::kinematics

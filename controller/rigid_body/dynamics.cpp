@@ -170,7 +170,7 @@ void centroidal(const Model& model, const Kinematics& kinematics, Centroidal& ou
   }
 }
 
-void centroidal_momentum_matrix(const Model& model, const State&, const Kinematics& kinematics,
+void centroidal_momentum_matrix(const Model& model, const Kinematics& kinematics,
                                 Matrix6Nu& A_G) noexcept {
   const std::array<CompositeInertia, kMaxBodies> composite = composite_inertias(model, kinematics);
   momentum_matrix(model, kinematics, composite, A_G);
@@ -189,7 +189,7 @@ Matrix3 effective_inertia(const Model& model, const State& state, const Kinemati
   const int rows = 3 * num_held + 3 + static_cast<int>(constraints.rows());
   const int free = 3 + model.num_joints;
   Matrix6Nu A_G;
-  centroidal_momentum_matrix(model, state, kinematics, A_G);
+  centroidal_momentum_matrix(model, kinematics, A_G);
 
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, kMaxRows, 6 + kMaxJoints> C(rows, 6 + model.num_joints);
   C.topRows<3>() = A_G.bottomRows<3>();

@@ -16,7 +16,6 @@
 
 namespace stance::rigid_body {
 
-using Vector6 = stance::Vector6;  ///< angular first
 /// Bounded matrices over nu: no allocation.
 using MatrixNu = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 6 + kMaxJoints, 6 + kMaxJoints>;
 using VectorNu = Eigen::Matrix<double, Eigen::Dynamic, 1, 0, 6 + kMaxJoints, 1>;
@@ -74,7 +73,7 @@ struct Centroidal {
 void centroidal(const Model& model, const Kinematics& kinematics, Centroidal& out) noexcept;
 
 /// Centroidal momentum matrix: (L_C_W, m v_WC) = A_G nu. Shape 6 x (6 + n).
-void centroidal_momentum_matrix(const Model& model, const State& state, const Kinematics& kinematics,
+void centroidal_momentum_matrix(const Model& model, const Kinematics& kinematics,
                                 Matrix6Nu& A_G) noexcept;
 
 /// Rows of linear constraints on nu.

@@ -18,6 +18,7 @@ using Catch::Matchers::ContainsSubstring;
 using Catch::Matchers::Message;
 using Catch::Matchers::MessageMatches;
 using test::biped;
+using test::biped_with;
 using test::biped_yaml_with;
 
 /// One mapping of the controller's section, and the steps that lead there.
@@ -47,6 +48,12 @@ std::vector<Mapping> controller_mappings() {
 }
 
 /// The biped's YAML with one of its mappings changed.
+behaviours::BipedConfig biped_config_of(const std::string& yaml_text) {
+  RobotDescription robot = biped();
+  robot.yaml_text = yaml_text;
+  return biped_config(robot);
+}
+
 std::string edited(const std::vector<std::string>& steps, const std::function<void(YAML::Node&)>& edit) {
   YAML::Node root = YAML::Load(biped().yaml_text);
   std::vector<YAML::Node> way{root};
@@ -58,7 +65,7 @@ std::string edited(const std::vector<std::string>& steps, const std::function<vo
 }  // namespace
 
 TEST_CASE("TheBipedsOwnConfigurationIsRead") {
-  const behaviours::BipedConfig c = biped_config_from_yaml(biped().yaml_text);
+  const behaviours::BipedConfig c = biped_config(biped());
   const YAML::Node yaml = YAML::Load(biped().yaml_text)["controller"];
   CHECK(c.last_link_pitch == yaml["last_link_pitch"].as<double>());
   CHECK(c.estimator.initial_accelerometer_bias_sigma ==
@@ -75,8 +82,9 @@ TEST_CASE("TheBipedsOwnConfigurationIsRead") {
   CHECK(c.fault_ladder.damp_time == yaml["safety"]["damp_time"].as<double>());
   const YAML::Node damping = YAML::Load(biped().yaml_text)["drives"]["damping"];
   for (int i = 0; i < kMaxJoints; ++i) CHECK(c.damping[i] == damping[i].as<double>());
-  CHECK(c.fall.min_upright == yaml["safety"]["min_upright"].as<double>());
-  CHECK(c.fall.min_height == yaml["safety"]["min_height"].as<double>());
+  const YAML::Node fallen = YAML::Load(biped().yaml_text)["fallen"];
+  CHECK(c.fallen.min_upright == fallen["min_upright"].as<double>());
+  CHECK(c.fallen.min_height == fallen["min_height"].as<double>());
   CHECK(c.validation.joint_velocity_factor == yaml["safety"]["joint_velocity_factor"].as<double>());
 }
 
@@ -86,7 +94,7 @@ TEST_CASE("AnyKeyOfTheControllersSectionThatIsMissingIsNamed") {
     for (const std::string& key : mapping.keys) {
       const std::string text = edited(mapping.steps, [&](YAML::Node& node) { node.remove(key); });
       CAPTURE(mapping.path, key);
-      CHECK_THROWS_MATCHES(biped_config_from_yaml(text), ConfigError,
+      CHECK_THROWS_MATCHES(biped_config_of(text), ConfigError,
                            Message("biped.yaml: " + mapping.path + key + " is missing"));
       ++removed;
     }
@@ -94,7 +102,7 @@ TEST_CASE("AnyKeyOfTheControllersSectionThatIsMissingIsNamed") {
   CHECK(removed > 50);
   YAML::Node root = YAML::Load(biped().yaml_text);
   root.remove("controller");
-  CHECK_THROWS_MATCHES(biped_config_from_yaml(YAML::Dump(root)), ConfigError,
+  CHECK_THROWS_MATCHES(biped_config_of(YAML::Dump(root)), ConfigError,
                        Message("biped.yaml: controller is missing"));
 }
 
@@ -105,7 +113,7 @@ TEST_CASE("AnUnknownKeyInAnyMappingOfTheControllersSectionIsNamed") {
     const std::string text = edited(mapping.steps, [](YAML::Node& node) { node["surprise"] = 1; });
     CAPTURE(mapping.path);
     CHECK_THROWS_MATCHES(
-        biped_config_from_yaml(text), ConfigError,
+        biped_config_of(text), ConfigError,
         MessageMatches(ContainsSubstring("biped.yaml: " + mapping.path + "surprise is not a known key")));
   }
 }
@@ -116,7 +124,7 @@ TEST_CASE("AnyValueOfTheControllersSectionThatIsAWordOrNotFiniteIsRefusedByItsPa
       for (const char* value : {"surprise", ".nan", ".inf"}) {
         const std::string text = edited(mapping.steps, [&](YAML::Node& node) { node[key] = YAML::Load(value); });
         CAPTURE(mapping.path, key, value);
-        CHECK_THROWS_MATCHES(biped_config_from_yaml(text), ConfigError,
+        CHECK_THROWS_MATCHES(biped_config_of(text), ConfigError,
                              MessageMatches(ContainsSubstring("biped.yaml: " + mapping.path + key + " ")));
       }
     }
@@ -152,8 +160,12 @@ TEST_CASE("AValueOutOfRangeIsRefusedByItsName") {
       Case{"force_qp.tolerance", "0", "tolerance"},
       Case{"force_qp.max_iterations", "0", "max_iterations"},
       Case{"force_qp.max_primal_residual", "0", "max_primal_residual"},
+      Case{"force_qp.max_dual_residual", "0", "max_dual_residual"},
       Case{"stand.stages", "0", "stages"},
-      Case{"stand.stages", "101", "stages"},
+      Case{"stand.stages", "33", "stages"},
+      Case{"stand.height_offset_rate", "0", "height_offset_rate"},
+      Case{"stand.height_offset_range", "[0.1, 0.2]", "height_offset_range"},
+      Case{"stand.height_offset_range", "[-0.2, -0.1]", "height_offset_range"},
       Case{"stand.state_weights", "[1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, -1]", "state_weights"},
       Case{"stand.force_weight", "0", "force_weight"},
       Case{"stand.height_integral_gain", "-1", "height_integral_gain"},
@@ -165,9 +177,6 @@ TEST_CASE("AValueOutOfRangeIsRefusedByItsName") {
       Case{"safety.hold_time", "0.21", "hold_time"},
       Case{"safety.hold_time", "-0.01", "hold_time"},
       Case{"safety.damp_time", "0", "damp_time"},
-      Case{"safety.min_upright", "0", "min_upright"},
-      Case{"safety.min_upright", "1", "min_upright"},
-      Case{"safety.min_height", "0", "min_height"},
       Case{"safety.max_angular_velocity", "0", "max_angular_velocity"},
       Case{"safety.max_acceleration", "-200", "max_acceleration"},
       Case{"safety.joint_position_margin", "0", "joint_position_margin"},
@@ -175,24 +184,45 @@ TEST_CASE("AValueOutOfRangeIsRefusedByItsName") {
   };
   for (const Case& c : cases) {
     CAPTURE(c.path, c.value);
-    CHECK_THROWS_MATCHES(biped_config_from_yaml(biped_yaml_with(std::string("controller.") + c.path, c.value)),
+    CHECK_THROWS_MATCHES(biped_config_of(biped_yaml_with(std::string("controller.") + c.path, c.value)),
                          ConfigError,
                          MessageMatches(ContainsSubstring("biped.yaml: controller: ") && ContainsSubstring(c.named)));
   }
 }
 
+TEST_CASE("DrivesAndTheLimitsOfAFallAreReadStrictlyToo") {
+  struct Case {
+    const char* path;
+    const char* value;
+    const char* message;
+  };
+  const std::array cases{
+      Case{"drives.damping", "[1, 1, 1, 1, 1, 1, 1, -1]", "drives.damping has an entry that is not >= 0"},
+      Case{"drives.command_timeout", "0.001", "drives.command_timeout is shorter than a control period"},
+      Case{"drives.comand_timeout", "0.04", "drives.comand_timeout is not a known key"},
+      Case{"fallen.min_upright", "0", "fallen.min_upright must be in 0..1"},
+      Case{"fallen.min_upright", "1", "fallen.min_upright must be in 0..1"},
+      Case{"fallen.min_height", "0", "fallen.min_height must be > 0 m"},
+      Case{"fallen.surprise", "1", "fallen.surprise is not a known key"},
+  };
+  for (const Case& c : cases) {
+    CAPTURE(c.path, c.value);
+    CHECK_THROWS_MATCHES(biped_with(c.path, c.value), ConfigError, MessageMatches(ContainsSubstring(c.message)));
+  }
+}
+
 TEST_CASE("AnUnknownEngineAndAWrongNumberOfWeightsAreRefusedByPath") {
   CHECK_THROWS_MATCHES(
-      biped_config_from_yaml(biped_yaml_with("controller.force_qp.engine", "qpoases")), ConfigError,
+      biped_config_of(biped_yaml_with("controller.force_qp.engine", "qpoases")), ConfigError,
       Message("biped.yaml: controller.force_qp.engine is 'qpoases', but must be osqp-condensed or osqp-sparse"));
-  CHECK_THROWS_MATCHES(biped_config_from_yaml(biped_yaml_with("controller.stand.state_weights", "[1, 2]")), ConfigError,
+  CHECK_THROWS_MATCHES(biped_config_of(biped_yaml_with("controller.stand.state_weights", "[1, 2]")), ConfigError,
                        Message("biped.yaml: controller.stand.state_weights has 2 entries, but must have 12"));
 }
 
 TEST_CASE("WithEngineChangesTheEngineAndNothingElse") {
   const std::string text = biped().yaml_text;
   const std::string sparse = with_engine(text, "osqp-sparse");
-  CHECK(biped_config_from_yaml(sparse).force_qp.engine == QpEngine::kOsqpSparse);
+  CHECK(biped_config_of(sparse).force_qp.engine == QpEngine::kOsqpSparse);
   YAML::Node before = YAML::Load(text), after = YAML::Load(sparse);
   before["controller"]["force_qp"].remove("engine");
   after["controller"]["force_qp"].remove("engine");

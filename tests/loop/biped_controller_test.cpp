@@ -34,7 +34,7 @@ constexpr int kSettled = 20;  // ticks
 constexpr std::int64_t kRun = 7;
 
 const BipedConfig& configuration() {
-  static const BipedConfig config = config::biped_config_from_yaml(biped().yaml_text);
+  static const BipedConfig config = config::biped_config(biped());
   return config;
 }
 int ticks_in(double seconds) { return static_cast<int>(std::lround(seconds / kControlPeriod)); }
@@ -187,6 +187,32 @@ TEST_CASE("StatesThatStayInvalidHoldDampAndStop") {
     state.gyro[1][0] = kNan;
     rig.tick_with(state);
   });
+}
+
+TEST_CASE("AStateWhoseNumberOrStampJumpsIsInvalidAndTheRunGoesOn") {
+  const std::vector<void (*)(robot_state_t&)> spoilers{
+      [](robot_state_t& s) { s.utime += 3'600'000'000; },
+      [](robot_state_t& s) { s.utime += 6'000; },
+      [](robot_state_t& s) { s.seq += 1; },
+      [](robot_state_t& s) { s.seq = std::numeric_limits<std::int64_t>::max(); },
+      [](robot_state_t& s) { s.utime = std::numeric_limits<std::int64_t>::max(); },
+  };
+  for (std::size_t i = 0; i < spoilers.size(); ++i) {
+    CAPTURE(i);
+    BipedRig rig;
+    rig.tick_times(kSettled);
+    robot_state_t state = rig.state();
+    spoilers[i](state);
+    rig.tick_with(state);
+    CHECK(rig.has(Fault::kStateInvalid));
+    CHECK(rig.trace().safety == SafetyMode::kHold);
+    rig.tick();
+    CHECK(rig.trace().safety == SafetyMode::kRun);
+    // States that were lost are none that jump.
+    for (int k = 0; k < 2; ++k) rig.simulator.advance();
+    rig.tick();
+    CHECK(rig.trace().faults == 0);
+  }
 }
 
 TEST_CASE("AStateOutOfOrderIsInvalid") {
@@ -530,7 +556,7 @@ TEST_CASE("AModelThatIsNoBipedIsRefused") {
   CHECK_THROWS_AS(BipedController(configuration(), robot.model, {robot.feet[0]}, robot.nominal_joint_position),
                   std::invalid_argument);
   BipedConfig config = configuration();
-  config.fall.min_height = -1.0;
+  config.torque_map.lead = -1.0;
   CHECK_THROWS_AS(BipedController(config, robot.model, robot.feet, robot.nominal_joint_position),
                   std::invalid_argument);
 }

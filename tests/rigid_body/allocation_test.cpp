@@ -38,7 +38,7 @@ TEST_CASE("KinematicsAndDynamicsDoNotAllocate") {
   Centroidal c;
   centroidal(biped.model, kinematics, c);
   Matrix6Nu A_G;
-  centroidal_momentum_matrix(biped.model, state, kinematics, A_G);
+  centroidal_momentum_matrix(biped.model, kinematics, A_G);
   // Products, as callers write them.
   const VectorNu momentum = M * velocity_of(biped.model, state);
   const MatrixNu square = M * M.transpose() - J.transpose() * A_G;

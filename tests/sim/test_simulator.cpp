@@ -147,7 +147,7 @@ TEST_CASE("DrivesDampWithin50msWithoutACommand") {
     run.simulator.advance();
     REQUIRE(++periods <= 5);
   }
-  const JointVector damping = drive_config(run.robot).damping;
+  const JointVector damping = run.robot.drives.damping;
   // A period that is damped throughout dissipates.
   run.simulator.advance();
   const robot_state_t& state = run.simulator.state();
@@ -332,21 +332,26 @@ TEST_CASE("MassFactorsChangeThePlantAndNotTheDescription") {
 
 namespace {
 
-// Error of one tick of the centroidal model over dt^2, in the unit of each state per s^2: the moment's change as C
-// moves past the feet at 0.1-0.2 m/s under 130 N makes most of it.
-constexpr double kTickTolerance = 40.0;
+// Error of one tick of the centroidal model over dt^2: (roll pitch yaw, p_WC, omega, v_WC), each in its unit per s^2.
+// Angles: half the angular acceleration, 45 rad/s^2 at most. Position: half the acceleration. Angular velocity: half the moment's rate over
+// the inertia, as C moves past the feet at 0.1-0.2 m/s under 130 N. Velocity: the forces are constant, only rounding.
+constexpr double kTickTolerance[] = {30.0, 2.0, 100.0, 1e-6};
 
 struct TickCase {
   double yaw = 0.0;                    // rad
   Vector3 velocity = Vector3::Zero();  // m/s
+  double roll_rate = 0.0;              // rad/s, about the body's own x axis
   Vector3 left = Vector3::Zero();      // N
   Vector3 right = Vector3::Zero();     // N
+
+  Vector3 omega_W() const { return math::rotation_z(yaw) * Vector3(roll_rate, 0.0, 0.0); }
 };
 
 const TickCase kTickCases[] = {
-    {0.0, Vector3::Zero(), {0.0, 0.0, 64.7}, {0.0, 0.0, 64.7}},
-    {0.4, {0.1, -0.05, 0.02}, {2.0, 1.0, 70.0}, {-1.0, 0.5, 60.0}},
-    {-1.2, {0.0, 0.2, 0.0}, {-3.0, 2.0, 50.0}, {-3.0, 2.0, 75.0}},
+    {0.0, Vector3::Zero(), 0.0, {0.0, 0.0, 64.7}, {0.0, 0.0, 64.7}},
+    {0.4, {0.1, -0.05, 0.02}, 0.0, {2.0, 1.0, 70.0}, {-1.0, 0.5, 60.0}},
+    {-1.2, {0.0, 0.2, 0.0}, 0.0, {-3.0, 2.0, 50.0}, {-3.0, 2.0, 75.0}},
+    {0.9, {0.1, 0.0, 0.0}, 0.8, {2.0, 1.0, 70.0}, {-1.0, 0.5, 60.0}},
 };
 
 centroidal::StateVector centroidal_state(const Mechanics& mechanics, const rigid_body::State& state) {
@@ -369,9 +374,10 @@ centroidal::StateVector predict(const TickCase& tick, double dt, const centroida
   at.dt = dt;
   at.yaw = tick.yaw;
   at.num_contacts = 2;
-  for (std::size_t foot = 0; foot < 2; ++foot) at.r[foot] = p_WF[foot] - x.segment<3>(3);
+  for (std::size_t foot = 0; foot < 2; ++foot) at.r[foot] = p_WF[foot] - Vector3(0.0, 0.0, robot.feet[foot].radius) - x.segment<3>(3);
   centroidal::Dynamics model;
-  centroidal::dynamics({whole.mass, whole.inertia_W}, at, model);
+  const Matrix3 inertia = kinematics::standing_inertia(robot.model, robot.feet, robot.nominal_joint_position);
+  centroidal::dynamics({whole.mass, inertia}, at, model);
   centroidal::ForceVector f(6);
   f << tick.left, tick.right;
   return model.A * x + model.B * f + model.g;
@@ -386,6 +392,7 @@ TEST_CASE("OneTickOfTheSingleBodyIsTheCentroidalModels") {
     scenario.command_delay_steps = 0;
     scenario.initial.roll_pitch_yaw.z() = tick.yaw;
     scenario.initial.velocity_W = tick.velocity;
+    scenario.initial.angular_velocity_W = tick.omega_W();
     Run run(scenario);
     const auto state = [&] {
       const truth_t& truth = run.simulator.truth();
@@ -398,11 +405,17 @@ TEST_CASE("OneTickOfTheSingleBodyIsTheCentroidalModels") {
     const truth_t& truth = run.simulator.truth();
     const centroidal::StateVector predicted =
         predict(tick, kControlPeriod, state(), {vector(truth.p_WF[0]), vector(truth.p_WF[1])});
-    REQUIRE(run.simulator.accept(plan_for(run.simulator, tick.left, tick.right)));
+    // Where the controller believes its feet to be moves nothing.
+    force_plan_t plan = plan_for(run.simulator, tick.left, tick.right);
+    plan.p_WF[0][1] += 0.05;
+    REQUIRE(run.simulator.accept(plan));
     run.simulator.advance();
     INFO("predicted " << predicted.transpose());
     INFO("simulated " << state().transpose());
-    CHECK((state() - predicted).cwiseAbs().maxCoeff() < kTickTolerance * kControlPeriod * kControlPeriod);
+    for (int block = 0; block < 4; ++block) {
+      CHECK((state() - predicted).segment<3>(3 * block).cwiseAbs().maxCoeff() <
+            kTickTolerance[block] * kControlPeriod * kControlPeriod);
+    }
   }
 }
 
@@ -412,13 +425,12 @@ TEST_CASE("TheSingleBodyLeavesTheCentroidalModelWithTheSquareOfTime") {
       WorldSetup setup = test::biped_world(0.82);
       setup.initial.R_WB = math::rotation_z(tick.yaw);
       setup.initial.v_WB = tick.velocity;
+      setup.initial.w_WB_W = tick.omega_W();
       SingleBody plant(setup);
       const ContactVectors tips = plant.foot_tips_W();
       const centroidal::StateVector predicted =
           predict(tick, steps * kPhysicsStep, centroidal_state(plant.mechanics(), plant.state()), tips);
-      AppliedForces forces;
-      forces.force_W = {tick.left, tick.right, Vector3::Zero(), Vector3::Zero()};
-      forces.p_WF = tips;
+      const ContactVectors forces = {tick.left, tick.right, Vector3::Zero(), Vector3::Zero()};
       for (int i = 0; i < steps; ++i) plant.step(forces, {});
       return (centroidal_state(plant.mechanics(), plant.state()) - predicted).cwiseAbs().maxCoeff();
     };
@@ -431,6 +443,16 @@ TEST_CASE("TheSingleBodyLeavesTheCentroidalModelWithTheSquareOfTime") {
     CHECK(sixteen > 3.5 * eight);
     CHECK(sixteen < 4.5 * eight);
   }
+}
+
+TEST_CASE("APushOnTheSingleBodysTrunkTurnsIt") {
+  SingleBody plant(test::biped_world(0.82));
+  const Vector3 force(3.0, 30.0, 0.0), moment(0.1, 0.2, 0.3);
+  const Vector3 lever = plant.state().p_WB - plant.mechanics().p_WC;
+  REQUIRE(lever.norm() > 0.05);
+  plant.step(zero_contact_vectors(), {force, moment});
+  const Vector3 expected = (moment + lever.cross(force)) * kPhysicsStep;
+  CHECK((plant.mechanics().L_C_W - expected).norm() < 1e-3 * expected.norm());
 }
 
 TEST_CASE("TheSingleBodysJointsKeepTheFeetWhereTheyAre") {

@@ -1,0 +1,24 @@
+#pragma once
+// When a legged robot has fallen: one rule for controller and simulator.
+#include <algorithm>
+#include <span>
+
+#include "controller/math/so3.hpp"
+
+namespace stance::kinematics {
+
+struct FallLimits {
+  double min_upright = 0.0;  ///< z component of B's z axis in W
+  double min_height = 0.0;   ///< m, of B over the lowest foot's ground point
+};
+
+/// `p_WF` [m]: tips of the feet, spheres of `foot_radius`; at least one. A pose that is not a number has fallen.
+inline bool has_fallen(const FallLimits& limits, const Matrix3& R_WB, const Vector3& p_WB,
+                       std::span<const Vector3> p_WF, double foot_radius) noexcept {
+  double ground = p_WF.front().z();
+  for (const Vector3& tip : p_WF) ground = std::min(ground, tip.z());
+  ground -= foot_radius;
+  return !(R_WB(2, 2) >= limits.min_upright && p_WB.z() - ground >= limits.min_height);
+}
+
+}  // namespace stance::kinematics
