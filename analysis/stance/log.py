@@ -19,7 +19,7 @@ import numpy as np
 import numpy.typing as npt
 
 from .errors import UnreadableError
-from .events import Buffer, EventIndex, Offsets, Skipped, index_events, overlapping
+from .events import Buffer, EventIndex, Offsets, Skipped, gather, index_events
 from .messages import CHANNELS, OPERATOR_CHANNELS, SELF_TEST_CHANNEL, MessageType, message_types
 from .series import Array, Integers, Run, RunInfo
 
@@ -235,10 +235,9 @@ def decode_columns(
         return columns
 
     low, high = min(run[0] for run in runs), max(run[1] for run in runs)
-    windows = overlapping(buffer, np.dtype((np.void, high - low)))
     rows = max(CHUNK_BYTES // (high - low), 16)
     for first in range(0, count, rows):
-        piece = windows[offsets[first : first + rows] + low]
+        piece = gather(buffer, offsets[first : first + rows] + low, (np.void, high - low))
         raw = piece.view(np.uint8).reshape(len(piece), high - low)
         for start, stop, base, block in runs:
             block[:, first : first + rows] = raw[:, start - low : stop - low].view(base).T
@@ -389,7 +388,7 @@ class Log:
     def _add_channel(self, report: ChannelReport, messages: LogMessages, run_order: list[int]) -> None:
         if messages.type.dtype is None:
             messages = messages.take(self._decodable(messages, report))
-        keys = {name: messages.field(name).astype(np.int64) for name in ("run_id", "utime", "seq")}
+        keys = {name: values.astype(np.int64) for name, values in messages._decode(("run_id", "utime", "seq")).items()}
         rank = np.full(len(messages), len(run_order), np.int64)
         for place, run_id in enumerate(run_order):
             rank[keys["run_id"] == run_id] = place
@@ -438,16 +437,17 @@ def _events_by_channel(buffer: Buffer, index: EventIndex) -> dict[str, npt.NDArr
     """channel → which events are on it, in file order."""
     name_offset = index.data_offset - index.channel_length
     found: dict[bytes, list[npt.NDArray[np.int64]]] = {}
-    for length in np.unique(index.channel_length).tolist():
-        names = overlapping(buffer, np.dtype((np.bytes_, length)))
+    for length in np.flatnonzero(np.bincount(index.channel_length)).tolist():
         rows = np.flatnonzero(index.channel_length == length)
-        values = names[name_offset[rows]]
+        values = gather(buffer, name_offset[rows], (np.bytes_, length))
         while len(rows):
             name = bytes(values[0])
             same = values == values[0]
             found.setdefault(name, []).append(rows[same])
             rows, values = rows[~same], values[~same]
-    merged = {name.decode("ascii", "replace"): np.sort(np.concatenate(parts)) for name, parts in found.items()}
+    merged = {
+        name.decode("ascii", "replace"): np.sort(np.concatenate(parts), kind="stable") for name, parts in found.items()
+    }
     return dict(sorted(merged.items(), key=lambda item: int(item[1][0])))
 
 
@@ -467,9 +467,7 @@ def _has_fingerprint(buffer: Buffer, offsets: Offsets, lengths: Integers, finger
     """Which payloads start with these 8 bytes."""
     result = np.zeros(len(offsets), bool)
     long_enough = np.flatnonzero(lengths >= 8)
-    windows = overlapping(buffer, np.dtype((np.void, 8)))
-    found = windows[offsets[long_enough]].view(">u8")
-    result[long_enough] = found == int.from_bytes(fingerprint, "big")
+    result[long_enough] = gather(buffer, offsets[long_enough], ">u8") == int.from_bytes(fingerprint, "big")
     return result
 
 

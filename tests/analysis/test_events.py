@@ -10,7 +10,7 @@ import pytest
 import stance.events as events
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from stance.events import SYNC_BYTES, index_events
+from stance.events import HEADER, SYNC_BYTES, gather, index_events
 from synthetic import encode_event, encode_log
 
 channels = st.text(alphabet="ABCDEF_012", min_size=1, max_size=12)
@@ -49,6 +49,20 @@ def test_reads_what_lcm_wrote(tmp_path: Path) -> None:
     writer.close()
     assert found_events(path.read_bytes()) == written
     assert index_events(path.read_bytes()).skipped == []
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.binary(min_size=HEADER.itemsize, max_size=100), st.data())
+def test_gather_reads_what_stands_at_each_offset_up_to_the_last_byte(buffer: bytes, data: st.DataObject) -> None:
+    dtype = data.draw(st.sampled_from([HEADER, np.dtype(">u8"), np.dtype("V7")]))
+    last = len(buffer) - dtype.itemsize
+    offsets = [*data.draw(st.lists(st.integers(0, last))), last]
+    expected = [np.frombuffer(buffer, dtype, 1, offset)[0] for offset in offsets]
+    assert gather(buffer, np.array(offsets), dtype).tolist() == [value.item() for value in expected]
+
+
+def test_gather_of_no_offsets_reads_nothing() -> None:
+    assert gather(b"", np.empty(0, np.int64), HEADER).shape == (0,)
 
 
 def test_an_empty_file_has_no_events() -> None:

@@ -135,6 +135,14 @@ def test_unknown_channels_other_types_and_wrong_sizes_are_reported() -> None:
     assert "SOMETHING_ELSE: unknown type, 10 bytes not read" in log.report.problems()
 
 
+def test_a_channel_keeps_file_order_where_its_name_ends_in_a_nul_at_times() -> None:
+    names = ["ROBOT_STATE", "ROBOT_STATE\0", "ROBOT_STATE", "ROBOT_STATE\0"]
+    states = [(at, name, data) for (at, _, data), name in zip(state_events([1, 2, 3, 4]), names, strict=True)]
+    log = Log.from_bytes(encode_log(states))
+    assert log.events_of["ROBOT_STATE"].tolist() == [0, 1, 2, 3]
+    assert log.report.problems() == []
+
+
 def test_damaged_run_info_is_reported_and_the_rest_is_read() -> None:
     good = Synthetic().run_info("stance-sim", 0, 1)
     infos = [(WALL, "RUN_INFO_SIMULATOR", good[:100]), (WALL, "RUN_INFO_SIMULATOR", good)]
