@@ -33,6 +33,7 @@ is_known() { apt-cache show "$1" >/dev/null 2>&1; }
 enable_backports() {
   local suite own=/etc/apt/sources.list.d/debian.sources out=/etc/apt/sources.list.d/stance-backports
   suite=$(. /etc/os-release && echo "${VERSION_CODENAME:-}")-backports
+  say "adding $suite to this machine's Debian sources: $out.*"
   if [ -f "$own" ]; then
     awk -v suite="$suite" 'BEGIN { RS = ""; ORS = "\n\n" } !seen++ { sub(/Suites:[^\n]*/, "Suites: " suite); print }' "$own" | as_root tee "$out.sources" >/dev/null
   else
