@@ -40,6 +40,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except BrokenPipeError:
         sys.stdout = open(os.devnull, "w")  # noqa: SIM115  (nobody reads any more: not an error of ours)
         return GOOD
+    except OSError as error:
+        place = f"{error.filename}: " if error.filename else ""
+        print(f"stance: {place}{error.strerror or error}", file=sys.stderr)
+        return USAGE
 
 
 # ---- commands --------------------------------------------------------------------------------------------------------

@@ -143,6 +143,16 @@ def test_unreadable_input_is_exit_3_and_one_line(
         assert capsys.readouterr().err.count("\n") == 1
 
 
+@pytest.mark.parametrize("command", [["report"], ["plot"], ["export", "csv"], ["export", "mat"]])
+def test_a_place_that_cannot_be_written_is_exit_2_and_one_line(
+    command: list[str], small: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main([*command, small, "--out", "/dev/null/there", "--silent"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("stance: /dev/null")
+    assert err.count("\n") == 1
+
+
 @pytest.mark.parametrize(
     "arguments", [[], ["fly"], ["info"], ["run", "--duration", "-1"], ["replay", "x", "--speed", "-1"]]
 )
