@@ -7,7 +7,6 @@ Imports are local to each command, so that each starts as fast as it can.
 from __future__ import annotations
 
 import argparse
-import json
 import os
 import sys
 import time
@@ -17,6 +16,7 @@ from typing import Any
 
 from . import __version__
 from .errors import GOOD, LIMIT_VIOLATED, USAGE, StanceError
+from .plain import to_json
 
 INTERRUPTED = 130
 
@@ -161,9 +161,8 @@ def _replay(options: argparse.Namespace) -> int:
     if options.verify:
         done = verify(options.log, capture=options.json or options.silent)
         if options.json:
-            print(
-                json.dumps({"equal": done.returncode == 0, "exit_code": done.returncode, "text": done.stdout.strip()})
-            )
+            result = {"equal": done.returncode == 0, "exit_code": done.returncode, "text": done.stdout.strip()}
+            _print(options, result, str)
         return done.returncode
     from .log import Log
     from .network import announced, ensure
@@ -264,7 +263,7 @@ def _say(options: argparse.Namespace, *lines: str) -> None:
 
 def _print(options: argparse.Namespace, result: Any, text: Callable[[], str]) -> None:
     if options.json:
-        print(json.dumps(result, indent=2))
+        print(to_json(result))
     elif not options.silent:
         print(text())
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import base64
-import json
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -18,6 +17,7 @@ from .errors import StanceError
 from .log import Log
 from .metrics import Metrics, Percentiles, measure, period
 from .picture import picture
+from .plain import to_json
 from .series import Run
 from .timeline import Event, timeline
 
@@ -118,7 +118,7 @@ def write(analysis: Analysis, directory: Path) -> Written:
     """Writes report.html, summary.json and plots/ into `directory`."""
     images = write_plots(analysis, directory / "plots")
     summary = directory / "summary.json"
-    summary.write_text(json.dumps(analysis.summary(), indent=2) + "\n")
+    summary.write_text(to_json(analysis.summary()) + "\n")
     report = directory / "report.html"
     report.write_text(render(analysis, {image.stem: image.read_bytes() for image in images}))
     return Written(report, summary, directory / "plots")

@@ -12,13 +12,14 @@ import time
 from pathlib import Path
 
 import fake_programs
+import numpy as np
 import pandas as pd
 import pytest
 from scipy.io import loadmat
 from stance import network, plots
 from stance.cli import main
 from stance.log import Log
-from synthetic import Synthetic
+from synthetic import WALL, Synthetic, encode_log
 
 
 @pytest.fixture(scope="module")
@@ -71,6 +72,19 @@ def test_check_takes_other_limits(small: str, tmp_path: Path, capsys: pytest.Cap
     assert main(["check", small, "--limits", str(limits)]) == 1
     assert "no tilt at all" in capsys.readouterr().out
     assert main(["check", small, "--limits", str(tmp_path / "absent.yaml")]) == 2
+
+
+def test_json_has_null_for_what_is_not_finite_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    messages = Synthetic(duration=0.5).messages()
+    messages["CONTROLLER_TRACE"]["qp_primal_residual"][20] = np.nan
+    log = tmp_path / "run.lcmlog"
+    log.write_bytes(encode_log([(WALL, channel, row.tobytes()) for channel, rows in messages.items() for row in rows]))
+    limits = tmp_path / "limits.yaml"
+    limits.write_text("limits: [{name: violation, metric: qp.primal_residual_max, max: 0.5}]")
+    assert main(["check", str(log), "--limits", str(limits), "--json"]) == 1
+    verdict = json.loads(capsys.readouterr().out, parse_constant=lambda name: pytest.fail(f"{name} is no JSON"))
+    assert verdict["findings"][0]["value"] is None
+    assert verdict["not_finite"] == {"findings.0.value": "inf"}
 
 
 def test_report_writes_its_files(
