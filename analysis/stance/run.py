@@ -89,14 +89,17 @@ def record(request: RunRequest, progress: Progress | None = None) -> RunOutcome:
     """Runs it and returns when every process has ended and the log is closed.
 
     Ctrl-C and SIGTERM end the run early, with a readable log. Raises MissingError where a program is absent, and
-    RunError with what it said last where one fails. LCM's network must be usable (`stance.network.ensure`).
+    RunError where there is a log already, or with what a program said last where one fails; of a run that fails before
+    its first state no file stays. LCM's network must be usable (`stance.network.ensure`).
     """
     import lcm
 
     programs = {name: find_program(name) for name in ("stance-controller", "stance-sim")}
     logger_program = find_lcm_tool("lcm-logger")
-    request.out.mkdir(parents=True, exist_ok=True)
     log = request.out / LOG_NAME
+    if log.exists():
+        raise RunError(f"{log} is there already: choose another --out, or remove it")
+    request.out.mkdir(parents=True, exist_ok=True)
     started = time.monotonic()
     try:
         listener = _Listener(lcm.LCM(request.url))
@@ -104,8 +107,13 @@ def record(request: RunRequest, progress: Progress | None = None) -> RunOutcome:
         raise RunError(
             f"LCM cannot start on {request.url}: no multicast route here; try --network namespace"
         ) from error
-    with announced("stance run", request.url), _Interruption() as interruption, _Children(request.out) as children:
-        logger_options = ["--force", "--quiet", f"--lcm-url={_patient(request.url)}", str(log)]
+    with (
+        _nothing_left_unless(lambda: "ROBOT_STATE" in listener.heard, request.out),
+        announced("stance run", request.url),
+        _Interruption() as interruption,
+        _Children(request.out) as children,
+    ):
+        logger_options = ["--quiet", f"--lcm-url={_patient(request.url)}", str(log)]
         logger = children.start("lcm-logger", [*_hurried(), str(logger_program), *logger_options])
         listener.wait(lambda: _is_logging(listener, log), logger, interruption, "it records nothing")
         controller = children.start(
@@ -131,6 +139,21 @@ def record(request: RunRequest, progress: Progress | None = None) -> RunOutcome:
         wall=time.monotonic() - started,
         notes=notes,
     )
+
+
+@contextlib.contextmanager
+def _nothing_left_unless(begun: Callable[[], bool], directory: Path) -> Iterator[None]:
+    """Where a run fails that has not `begun`, its files go, and the directory too where it holds no others."""
+    before = set(directory.iterdir())
+    try:
+        yield
+    except RunError:
+        if not begun():
+            for path in set(directory.iterdir()) - before:
+                path.unlink()
+            if not before:
+                directory.rmdir()
+        raise
 
 
 def _patient(url: str) -> str:

@@ -1,6 +1,7 @@
 """Stand-ins for stance-sim and stance-controller: the same messages over the same network, and no physics.
 
-FAKE_SIM chooses how the simulator behaves: good (default), fall, fail, forever. FAKE_CONTROLLER: good, fail, die, mute.
+FAKE_SIM chooses how the simulator behaves: good (default), fall, fail, forever. FAKE_CONTROLLER: good, fail, mute, die
+(soon after the first state).
 """
 
 from __future__ import annotations
@@ -42,11 +43,13 @@ def controller(options: argparse.Namespace, connection: lcm.LCM) -> int:
     if manner == "fail":
         print("stance-controller: biped.yaml: controller.force_qp.friction is missing", file=sys.stderr)
         return 2
-    begun = time.monotonic()
-    while manner != "die" or time.monotonic() - begun < 1.0:
+    heard: list[bytes] = []
+    connection.subscribe("ROBOT_STATE", lambda _, data: heard.append(data))
+    while manner != "die" or not heard:
         if manner != "mute":
             connection.publish("RUN_INFO_CONTROLLER", Synthetic().run_info("stance-controller", 0, 1))
-        time.sleep(0.1)
+        connection.handle_timeout(100)
+    time.sleep(0.5)
     print("stance-controller: out of memory", file=sys.stderr)
     return 3
 

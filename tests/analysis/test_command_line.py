@@ -272,6 +272,43 @@ def test_a_failing_program_is_one_line_with_its_own_words(
     assert code == 2
     assert message in err
     assert err.count("\n") == 1
+    assert stance.out.exists() == (
+        environment == {"FAKE_CONTROLLER": "die"}
+    )  # the others failed before the first state
+
+
+@needs_network
+def test_a_controller_that_says_nothing_is_given_up_after_its_time(stance: Stance) -> None:
+    code = "from stance import run; run.READY_TIMEOUT = 1.0; from stance.cli import main; raise SystemExit(main())"
+    prefix = [] if network.host_is_loopback() else network.namespace_command() or []
+    done = subprocess.run(
+        [*prefix, sys.executable, "-c", code, "run", "--out", str(stance.out)],
+        env={**stance.environment, network.INSIDE: "1", "FAKE_CONTROLLER": "mute"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 2
+    assert "stance-controller is not ready after 1 s: it sent no RUN_INFO_CONTROLLER" in done.stderr
+
+
+@needs_network
+def test_a_run_that_never_began_leaves_what_was_there_before(stance: Stance) -> None:
+    stance.out.mkdir()
+    note = stance.out / "note.txt"
+    note.write_text("mine")
+    assert stance.run("run", "--out", str(stance.out), FAKE_SIM="fail")[0] == 2
+    assert list(stance.out.iterdir()) == [note]
+
+
+@needs_network
+def test_a_log_that_is_there_is_not_overwritten(stance: Stance) -> None:
+    stance.out.mkdir()
+    log = stance.out / "run.lcmlog"
+    log.write_bytes(b"of yesterday")
+    code, _, err = stance.run("run", "--duration", "0.5", "--out", str(stance.out))
+    assert (code, log.read_bytes()) == (2, b"of yesterday")
+    assert err == f"stance: {log} is there already: choose another --out, or remove it\n"
 
 
 @needs_network
