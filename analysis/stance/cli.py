@@ -7,6 +7,7 @@ Imports are local to each command, so that each starts as fast as it can.
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import sys
 import time
@@ -50,9 +51,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> int:
+    from .check import load_limits
     from .network import ensure
     from .run import RunRequest, progress_bar, record
 
+    if options.limits is not None:
+        load_limits(options.limits)  # a list that cannot be used is told before the run, not after it
     ensure(options.network, options.given)
     name = f"{time.strftime('%Y%m%d-%H%M%S')}-{options.robot}-{Path(options.scenario).stem}"
     request = RunRequest(
@@ -135,22 +139,29 @@ def _plot(options: argparse.Namespace) -> int:
     from .report import analyse, figures, write_plots
     from .style import render
 
+    drawing = options.at is not None or options.view is not None
+    if drawing and (options.only or options.list):
+        raise StanceError("--at and --view draw the robot and nothing else: leave out --only and --list")
     analysis = analyse(Log.open(options.log), options.run, options.limits)
     if options.list:
         names = list(figures(analysis))
         _print(options, names, lambda: "\n".join(names))
         return GOOD
+    first, last = analysis.run.span
     if options.first is not None or options.last is not None:
         analysis = replace(analysis, run=analysis.run.between(options.first, options.last))
+        if not analysis.run.count("ROBOT_STATE"):
+            raise StanceError(f"no state between --from and --to: the run goes from {first:.2f} to {last:.2f} s")
+    if not all(first <= instant <= last for instant in options.at or []):
+        raise StanceError(f"--at must be within the run, from {first:.2f} to {last:.2f} s")
     out = options.out or options.log.parent / "plots"
-    if options.picture and (options.at or options.view):
+    if drawing:
         out.mkdir(parents=True, exist_ok=True)
         path = out / f"picture.{options.format}"
         path.write_bytes(render(picture(analysis.run, options.at, options.view), options.format))
         written = [path]
     else:
-        only = ["picture"] if options.picture else options.only
-        written = write_plots(analysis, out, only, options.format)
+        written = write_plots(analysis, out, options.only, options.format)
     _print(options, [str(path) for path in written], lambda: "\n".join(map(str, written)))
     return GOOD
 
@@ -159,6 +170,8 @@ def _replay(options: argparse.Namespace) -> int:
     from .replay import replay, select, verify
 
     if options.verify:
+        if options.channels or options.speed != 1.0 or (options.first, options.last) != (None, None):
+            raise StanceError("--verify takes the whole log: leave out --channels, --speed, --from and --to")
         done = verify(options.log, capture=options.json or options.silent)
         if options.json:
             result = {"equal": done.returncode == 0, "exit_code": done.returncode, "text": done.stdout.strip()}
@@ -295,8 +308,9 @@ def _parser() -> argparse.ArgumentParser:
     run.add_argument("--plant", help="the simulator's plant")
     run.add_argument("--run-id", type=int, help="stands in every message (default: 1 in lockstep, else the time)")
     run.add_argument("--out", type=Path, metavar="DIR", help="where everything goes (default: runs/<time>-...)")
-    run.add_argument("--no-report", action="store_true", help="only the log")
-    _add_limits(run)
+    after = run.add_mutually_exclusive_group()
+    after.add_argument("--no-report", action="store_true", help="only the log")
+    _add_limits(after)
     _add_network(run)
     run.set_defaults(run=None)
 
@@ -316,11 +330,11 @@ def _parser() -> argparse.ArgumentParser:
     _add_log(plot, with_run=True)
     _add_limits(plot)
     _add_span(plot, "the run's start")
-    plot.add_argument("--only", nargs="+", metavar="PLOT", help="these plots (--list names them)")
-    plot.add_argument("--list", action="store_true", help="names of the plots that this log can give")
-    plot.add_argument("--picture", action="store_true", help="only the drawing of the robot taking its pushes")
-    plot.add_argument("--at", nargs="+", type=float, metavar="S", help="with --picture: the instants to draw")
-    plot.add_argument("--view", choices=("side", "front"), help="with --picture: from where")
+    chosen = plot.add_mutually_exclusive_group()
+    chosen.add_argument("--only", nargs="+", metavar="PLOT", help="these plots (--list names them)")
+    chosen.add_argument("--list", action="store_true", help="names of the plots that this log can give")
+    plot.add_argument("--at", nargs="+", type=float, metavar="S", help="only the robot, at these seconds")
+    plot.add_argument("--view", choices=("side", "front"), help="only the robot, from this side")
     plot.add_argument("--format", choices=("png", "svg", "pdf"), default="png")
     plot.add_argument("--out", "--save-plot", type=Path, metavar="DIR", help="where to (default: plots/ by the log)")
 
@@ -340,9 +354,9 @@ def _parser() -> argparse.ArgumentParser:
     study = add("study", _study, "Pushes on the standing biped, in 8 directions on an ellipse; exit 1 where it falls.")
     study.add_argument("--scenario", default="stand", help="what the pushes are added to (default: stand)")
     study.add_argument("--scales", nargs="+", type=_positive, default=[1.0], help="of the ellipse (0.8, 4) N s")
-    study.add_argument("--moments", type=int, default=5, help="pushes in each direction (default: 5)")
+    study.add_argument("--moments", type=_count, default=5, help="pushes in each direction (default: 5)")
     study.add_argument("--seed", type=int, default=10_000, help="of the moments and the noise (default: 10000)")
-    study.add_argument("--workers", type=int, help="rollouts at once (default: one for each core)")
+    study.add_argument("--workers", type=_count, help="rollouts at once (default: one for each core)")
 
     shell = add("shell", _shell, "A shell, or a command, in the network of a running `stance run` or `stance replay`.")
     shell.add_argument("--pid", type=int, help="of the process to join (default: the newest)")
@@ -358,7 +372,7 @@ def _add_log(parser: argparse.ArgumentParser, with_run: bool = False) -> None:
         parser.add_argument("--run", type=int, metavar="ID", help="run_id, where the log holds more than one run")
 
 
-def _add_limits(parser: argparse.ArgumentParser) -> None:
+def _add_limits(parser: argparse._ActionsContainer) -> None:
     parser.add_argument("--limits", type=Path, metavar="FILE", help="YAML (default: the robot's and scenario's own)")
 
 
@@ -378,8 +392,15 @@ def _add_network(parser: argparse.ArgumentParser) -> None:
 
 def _positive(text: str) -> float:
     value = float(text)
-    if not value > 0.0:
+    if not 0.0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
+
+
+def _count(text: str) -> int:
+    value = int(text)
+    if value < 1:
+        raise argparse.ArgumentTypeError(f"{text} is below 1")
     return value
 
 

@@ -44,7 +44,7 @@ def select(
     """Rows of `log.index` to play, in order of the time of their reception.
 
     `channels` are names or patterns such as CONTROLLER_*; `first` and `last` [s] count from the log's first event.
-    Raises StanceError where a name matches no channel.
+    Raises StanceError where a name matches no channel, or where there is nothing between these times.
     """
     held = [name for name in log.events_of if name != SELF_TEST_CHANNEL]
     chosen = held
@@ -57,8 +57,11 @@ def select(
     everything = np.concatenate([log.events_of[name] for name in held] or [np.empty(0, np.int64)])
     if not len(everything):
         raise UnreadableError(f"{log.path}: nothing to play in it")
-    at = (log.index.time[rows] - log.index.time[everything].min()) * 1e-6
+    begin, end = log.index.time[everything].min(), log.index.time[everything].max()
+    at = (log.index.time[rows] - begin) * 1e-6
     kept = (at >= (-np.inf if first is None else first)) & (at <= (np.inf if last is None else last))
+    if not kept.any():
+        raise StanceError(f"{log.path}: nothing to play between these times; it lasts {(end - begin) * 1e-6:.2f} s")
     return np.asarray(rows[kept][np.argsort(log.index.time[rows[kept]], kind="stable")])
 
 

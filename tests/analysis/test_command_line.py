@@ -102,9 +102,8 @@ def test_plot_draws_what_is_asked_for(small: str, tmp_path: Path, capsys: pytest
     out = ["--out", str(tmp_path)]
     assert main(["plot", small, *out, "--only", "gait", "--from", "0.1", "--to", "0.4", "--format", "svg"]) == 0
     assert (tmp_path / "gait.svg").read_bytes().startswith(b"<?xml")
-    assert main(["plot", small, *out, "--picture"]) == 0
+    assert main(["plot", small, *out, "--at", "0.1", "0.3", "--view", "front", "--silent"]) == 0
     assert (tmp_path / "picture.png").exists()
-    assert main(["plot", small, *out, "--picture", "--at", "0.1", "0.3", "--view", "front", "--silent"]) == 0
     assert main(["plot", small, *out, "--only", "nonsense"]) == 2
 
 
@@ -168,7 +167,51 @@ def test_a_place_that_cannot_be_written_is_exit_2_and_one_line(
 
 
 @pytest.mark.parametrize(
-    "arguments", [[], ["fly"], ["info"], ["run", "--duration", "-1"], ["replay", "x", "--speed", "-1"]]
+    ("arguments", "message"),
+    [
+        (["plot", "--from", "0.5", "--to", "0.3"], "the run goes from 0.00 to 0.60 s"),
+        (["plot", "--from", "100"], "the run goes from 0.00 to 0.60 s"),
+        (["plot", "--at", "100"], "from 0.00 to 0.60 s"),
+        (["plot", "--at", "0.1", "--only", "gait"], "leave out --only"),
+        (["plot", "--view", "front", "--list"], "leave out --only and --list"),
+        (["replay", "--from", "100"], "it lasts 0."),
+        (["replay", "--from", "0.5", "--to", "0.3"], "nothing to play"),
+        (["replay", "--verify", "--channels", "TRUTH"], "takes the whole log"),
+        (["replay", "--verify", "--speed", "2"], "takes the whole log"),
+    ],
+)
+def test_options_that_would_do_nothing_are_exit_2(
+    arguments: list[str], message: str, small: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    command, *options = arguments
+    out = ["--out", str(tmp_path)] if command == "plot" else []
+    assert main([command, small, *out, *options]) == 2
+    assert message in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())
+
+
+def test_limits_that_cannot_be_used_are_told_before_the_run(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(network, "ensure", lambda *_: pytest.fail("began to run"))
+    assert main(["run", "--out", str(tmp_path), "--limits", str(tmp_path / "absent.yaml")]) == 2
+    assert "absent.yaml: No such file" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [],
+        ["fly"],
+        ["info"],
+        ["run", "--duration", "-1"],
+        ["run", "--duration", "inf"],
+        ["run", "--no-report", "--limits", "x"],
+        ["replay", "x", "--speed", "-1"],
+        ["plot", "x", "--list", "--only", "gait"],
+        ["study", "--moments", "0"],
+        ["study", "--workers", "-1"],
+    ],
 )
 def test_usage_errors_are_exit_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
