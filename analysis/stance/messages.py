@@ -30,6 +30,9 @@ CHANNELS = {
 OPERATOR_CHANNELS = ("USER_COMMAND", "STOP", "PUSH")
 """sent by hand: their clock is the operator's, not the simulator's"""
 
+CONTROLLER_CHANNELS = ("JOINT_COMMAND", "FORCE_PLAN", "CONTROLLER_TRACE", "CONTROLLER_TIMING")
+"""what the controller sends once a tick"""
+
 SELF_TEST_CHANNEL = "LCM_SELF_TEST"
 """what every LCM instance sends itself at start: never data"""
 

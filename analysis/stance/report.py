@@ -15,6 +15,7 @@ from . import __version__, configuration, plots, style
 from .check import Verdict, judge, limits_file, load_limits
 from .errors import StanceError
 from .log import Log
+from .messages import CONTROLLER_CHANNELS
 from .metrics import Metrics, Percentiles, measure, period
 from .picture import picture
 from .plain import to_json
@@ -77,8 +78,8 @@ def analyse(log: Log, run_id: int | None = None, limits: Path | None = None) -> 
     Raises UnreadableError where the log has no such run, and StanceError where the limits cannot be used.
     """
     run = log.run(run_id)
-    # What the controller does once the robot has fallen silent for good is no part of the run.
-    run = run.between(None, run.span[1] + 1.5 * period(run))
+    # What the controller does once the robot has fallen silent for good is no part of the run; the truth ends later.
+    run = run.between(None, run.span[1] + 0.5 * period(run), CONTROLLER_CHANNELS)
     measured = measure(run, log.report)
     info = run.controller or run.simulator
     chosen = limits or limits_file(info.robot if info else "", configuration.scenario_name(run))

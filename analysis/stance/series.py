@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -112,12 +112,12 @@ class Run:
         first, last = self.span
         return last - first
 
-    def between(self, first: float | None, last: float | None) -> Run:
-        """The part from `first` to `last` [s]; times still count from the whole run's start."""
+    def between(self, first: float | None, last: float | None, of: Collection[str] | None = None) -> Run:
+        """The part from `first` to `last` [s]; times still count from the run's start. `of`: only these are cut."""
         low, high = -np.inf if first is None else first, np.inf if last is None else last
         parts, times = {}, {}
         for name, messages in self.channels.items():
-            rows = (self.time(name) >= low) & (self.time(name) <= high)
+            rows = (self.time(name) >= low) & (self.time(name) <= high) | (of is not None and name not in of)
             if rows.any() or name == "ROBOT_STATE":
                 parts[name], times[name] = messages.take(rows), self.time(name)[rows]
         return replace(self, channels=parts, _time=times)

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from stance import plots, style
 from stance.errors import StanceError, UnreadableError
 from stance.log import Log
+from stance.messages import CONTROLLER_CHANNELS
 from stance.metrics import measure
 from stance.picture import picture, pose_at
 from stance.report import MAX_EVENTS, analyse, figures, render, write, write_plots
@@ -118,6 +119,25 @@ def test_the_summary_is_versioned_and_holds_figures_verdict_and_events(written: 
     times = [event["at"] for event in summary["events"]]
     assert times == sorted(times)
     assert {"push", "fall", "fault", "safety", "missed", "run", "command"} <= {e["kind"] for e in summary["events"]}
+
+
+def test_a_run_ends_with_the_tick_of_its_last_state_and_the_truth_after_it() -> None:
+    messages = Synthetic(duration=0.5).messages()
+    events = [(int(row["seq"]), channel, row.tobytes()) for channel, rows in messages.items() for row in rows]
+    for channel in (*CONTROLLER_CHANNELS, "TRUTH"):
+        last = messages[channel][-1:]
+        last["seq"] += 1
+        last["utime"] += round(PERIOD * 1e6)
+        if channel == "CONTROLLER_TRACE":  # it waits in vain for one more state
+            last["state_is_new"], last["faults"], last["fault_count"][:, 0] = 0, 1, 1
+        elif channel == "TRUTH":
+            last["fallen"] = 1
+        events.append((int(last["seq"][0]), channel, last[0].tobytes()))
+    analysis = analyse(Log.from_bytes(encode_log(sorted(events))))
+    assert analysis.metrics.ticks is not None
+    assert (analysis.metrics.ticks.count, analysis.metrics.ticks.without_new_state) == (51, 0)
+    assert analysis.metrics.faults["state_stale"] == 0
+    assert analysis.metrics.fell_at == pytest.approx(0.51)
 
 
 def test_every_plot_lies_beside_the_report(written: Path) -> None:
