@@ -95,7 +95,10 @@ class Ticks:
     missed_share: float
     """missed of all that were due"""
     without_new_state: int
+    without_new_state_share: float
+    """of all ticks"""
     dropped_states: int
+    """that a later one replaced before a tick took them"""
     lockstep: bool
     misses: list[Miss]
 
@@ -251,6 +254,8 @@ class Metrics:
     refused_total: int
     drives_damped: float | None
     """s"""
+    drives_damped_share: float | None
+    """of the run"""
     faults: dict[str, int]
     safety: list[SafetyChange]
     channels: list[ChannelUse]
@@ -284,6 +289,7 @@ def measure(run: Run, report: LogReport | None = None) -> Metrics:
         refused=refused,
         refused_total=sum(refused.values()),
         drives_damped=None if damped is None else float((damped != 0).sum() * period(run)),
+        drives_damped_share=None if damped is None else float((damped != 0).mean()),
         faults=faults(run),
         safety=safety(run),
         channels=channels(run),
@@ -364,9 +370,9 @@ def center_of_mass(run: Run) -> CenterOfMass | None:
     return CenterOfMass(float(distance.max()), _rms(distance), float(distance[-1]))
 
 
-def missed_by_tick(run: Run) -> Integers:
-    """How many deadlines were missed before each message of CONTROLLER_TIMING, (n,)."""
-    total = run.field("CONTROLLER_TIMING", "missed_ticks")
+def risen(run: Run, counter: str) -> Integers:
+    """By how much a counter of CONTROLLER_TIMING rose before each message, (n,); not what it had before the run."""
+    total = run.field("CONTROLLER_TIMING", counter)
     fresh = run.field("CONTROLLER_TIMING", "seq") == 1
     before = np.concatenate([total[:1], total[:-1]])
     return np.asarray(np.maximum(np.where(fresh, total, total - before), 0), np.int64)
@@ -382,7 +388,7 @@ def is_lockstep(run: Run) -> bool:
 def ticks(run: Run) -> Ticks | None:
     if "CONTROLLER_TIMING" not in run:
         return None
-    missed = missed_by_tick(run)
+    missed = risen(run, "missed_ticks")
     time = run.time("CONTROLLER_TIMING")
     late = run.field("CONTROLLER_TIMING", "wake_latency_us")
     took = run.field("CONTROLLER_TIMING", "tick_us")
@@ -397,16 +403,16 @@ def ticks(run: Run) -> Ticks | None:
         else:
             cause = f"woke {late[row] / 1000:.1f} ms late: the machine ran something else"
         misses.append(Miss(float(time[row]), int(missed[row]), float(late[row]), float(took[row]), cause))
-    dropped = run.field("CONTROLLER_TIMING", "dropped_states")
     count = run.count("CONTROLLER_TIMING")
     total = int(missed.sum())
-    is_new = run.field("CONTROLLER_TRACE", "state_is_new") if "CONTROLLER_TRACE" in run else np.ones(count)
+    waiting = run.field("CONTROLLER_TRACE", "state_is_new") == 0 if "CONTROLLER_TRACE" in run else np.zeros(1, bool)
     return Ticks(
         count=count,
         missed=total,
         missed_share=total / (count + total),
-        without_new_state=int((is_new == 0).sum()),
-        dropped_states=int(dropped.max(initial=0)),
+        without_new_state=int(waiting.sum()),
+        without_new_state_share=float(waiting.mean()),
+        dropped_states=int(risen(run, "dropped_states").sum()),
         lockstep=is_lockstep(run),
         misses=misses,
     )

@@ -95,7 +95,7 @@ def _run_facts(run: Run, measured: Metrics) -> list[tuple[str, str]]:
     found = measured.ticks
     if found is not None:
         facts.append(("clock", "lockstep" if found.lockstep else "real time"))
-        facts.append(("ticks", f"{found.count}, missed {found.missed}"))
+        facts.append(("ticks", f"{found.count}, missed {found.missed}, without a new state {found.without_new_state}"))
         for miss in found.misses[:4]:
             facts.append(("", f"{miss.ticks} at {miss.at:.2f} s: {miss.cause}"))
         if len(found.misses) > 4:
@@ -137,7 +137,7 @@ def timing(run: Run) -> Figure:
     else:
         ax.plot(time[1:], (period[1:] - deadline) / 1000, color=style.TRUTH, lw=0.6)
         ax.set_ylabel("deviation [ms]")
-        missed = metrics.missed_by_tick(run)
+        missed = metrics.risen(run, "missed_ticks")
         rows = np.flatnonzero(missed)
         ax.plot(time[rows], (period[rows] - deadline) / 1000, "v", color=style.BAD, ms=5)
         told = f"{missed.sum()} missed, marked" if len(rows) else "none missed"

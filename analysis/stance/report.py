@@ -16,7 +16,7 @@ from .check import Verdict, judge, limits_file, load_limits
 from .errors import StanceError
 from .log import Log
 from .messages import CONTROLLER_CHANNELS
-from .metrics import Metrics, Percentiles, measure, period
+from .metrics import Metrics, Percentiles, Ticks, measure, period
 from .picture import picture
 from .plain import to_json
 from .series import Run
@@ -158,6 +158,8 @@ class Table:
 def tables(metrics: Metrics) -> list[Table]:
     """The metrics for people, in the order of the report."""
     found = [Table("Motion", ["figure", "value"], _motion(metrics))]
+    if metrics.ticks is not None:
+        found.append(Table("Ticks", ["what", "count"], _ticks(metrics.ticks)))
     if metrics.timing is not None:
         timing = metrics.timing
         rows = [
@@ -215,6 +217,15 @@ def _motion(metrics: Metrics) -> list[list[str]]:
     if metrics.drives_damped is not None:
         rows.append(["drives damped", f"{metrics.drives_damped:.2f} s"])
     return rows
+
+
+def _ticks(ticks: Ticks) -> list[list[str]]:
+    return [
+        ["ticks", f"{ticks.count}"],
+        ["deadlines missed", f"{ticks.missed}"],
+        ["ticks without a new state", f"{ticks.without_new_state}"],
+        ["states that a later one replaced before a tick", f"{ticks.dropped_states}"],
+    ]
 
 
 def _force_qp(metrics: Metrics) -> list[list[str]]:

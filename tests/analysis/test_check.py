@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 from stance.check import DIRECTORY, Limit, judge, limits_file, load_limits, parse_limits
 from stance.errors import StanceError
 from stance.log import Log
 from stance.metrics import measure
 from stance.series import Run
-from synthetic import Synthetic
+from synthetic import Synthetic, run_of
 
 FIGURES = {"fell": False, "trunk": {"tilt_max_deg": 3.0}, "qp": None, "count": 2}
 
@@ -57,13 +59,19 @@ def test_what_is_no_list_of_limits_is_an_error(text: str) -> None:
 
 
 @pytest.mark.parametrize("path", sorted(DIRECTORY.glob("*.yaml")), ids=lambda path: path.stem)
-def test_every_list_that_comes_with_the_package_names_figures_that_exist(path, stand: Run) -> None:  # type: ignore[no-untyped-def]
-    assert judge(measure(stand).as_dict() | {"log": None}, load_limits(path)).findings
+def test_every_list_that_comes_with_the_package_names_figures_that_exist(path: Path, log_path: Path) -> None:
+    log = Log.open(log_path)
+    findings = judge(measure(log.run(), log.report).as_dict(), load_limits(path)).findings
+    assert findings and all(finding.value is not None for finding in findings)
 
 
-def test_standing_keeps_the_limits_and_falling_does_not(stand: Run) -> None:
+def test_standing_keeps_the_limits_and_falling_or_standing_without_states_does_not(stand: Run) -> None:
     limits = load_limits(limits_file("biped", "demo"))
     assert judge(measure(stand).as_dict(), limits).passed
+    held = Synthetic().messages()
+    held["CONTROLLER_TRACE"]["state_is_new"][100:120], held["TRUTH"]["drives_damped"][100:120] = 0, 1
+    violated = judge(measure(run_of(held)).as_dict(), limits).violated
+    assert [finding.limit.name for finding in violated] == ["ticks without a new state", "time with the drives damped"]
     fallen = Log.from_bytes(Synthetic(fall_at=2.0, qp_failures=(50,)).log())
     violated = judge(measure(fallen.run(), fallen.report).as_dict(), limits).violated
     assert {"fell", "largest trunk tilt", "failed QPs"} <= {finding.limit.name for finding in violated}

@@ -128,9 +128,19 @@ def test_missed_ticks_add_up_over_a_controller_that_was_started_again() -> None:
 def test_misses_from_before_the_run_are_not_its_own() -> None:
     timing = ticked("controller_timing_t", N)
     timing["seq"] += 500
-    timing["slack_us"], timing["missed_ticks"] = 9000.0, 7
+    timing["slack_us"], timing["missed_ticks"], timing["dropped_states"] = 9000.0, 7, 60
+    timing["dropped_states"][50:] = 62
     found = metrics.ticks(run_of(base(CONTROLLER_TIMING=timing)))
-    assert found is not None and found.missed == 0
+    assert found is not None
+    assert (found.missed, found.dropped_states) == (0, 2)
+
+
+def test_ticks_without_a_new_state_are_a_share_of_all() -> None:
+    timing, decided = ticked("controller_timing_t", N), trace()
+    decided["state_is_new"][20:25] = 0
+    found = metrics.ticks(run_of(base(CONTROLLER_TIMING=timing, CONTROLLER_TRACE=decided)))
+    assert found is not None
+    assert (found.without_new_state, found.without_new_state_share) == (5, pytest.approx(5 / N))
 
 
 def test_lockstep_has_stage_times_but_no_latency() -> None:
@@ -256,7 +266,7 @@ def test_refusals_faults_and_safety_modes() -> None:
     found = measure(run)
     assert found.refused == {"stale": 2, "not_finite": 0, "order": 1, "run": 0}
     assert found.refused_total == 3
-    assert found.drives_damped == pytest.approx(0.1)
+    assert (found.drives_damped, found.drives_damped_share) == (pytest.approx(0.1), pytest.approx(10 / N))
     assert found.faults["state_stale"] == 5
     assert [(change.at, change.mode) for change in found.safety] == [
         (0.0, "run"),
