@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 MIN_NORMAL_FORCE = 5.0  # N, below it a contact's friction ratio says nothing
 PUSH_THRESHOLD = 1e-9  # N, of a push that counts as one
+SLIP_WINDOW = 0.5  # s at the run's end: the least late of its states shows what real time has lost
 
 STAGES = ("decode", "validate", "estimate", "plan", "model", "force_qp", "torque", "safety", "encode")
 SAFETY_MODES = ("run", "hold", "damp", "stop")
@@ -100,6 +101,8 @@ class Ticks:
     dropped_states: int
     """that a later one replaced before a tick took them"""
     lockstep: bool
+    slip: float | None
+    """s, by which the states' stamps fell behind the logger's clock; None in lockstep"""
     misses: list[Miss]
 
 
@@ -385,6 +388,16 @@ def is_lockstep(run: Run) -> bool:
     )
 
 
+def slip(run: Run) -> float:
+    """s, by which simulated time fell behind the logger's: where the machine stalls, the simulator slips whole periods.
+
+    A state may be heard late but never early, so that the least late ones tell the two clocks' distance.
+    """
+    distance = run.channels["ROBOT_STATE"].received - run.field("ROBOT_STATE", "utime")
+    at_the_end = run.time("ROBOT_STATE") >= run.span[1] - SLIP_WINDOW
+    return float(distance[at_the_end].min() - distance.min()) * 1e-6
+
+
 def ticks(run: Run) -> Ticks | None:
     if "CONTROLLER_TIMING" not in run:
         return None
@@ -403,6 +416,7 @@ def ticks(run: Run) -> Ticks | None:
         else:
             cause = f"woke {late[row] / 1000:.1f} ms late: the machine ran something else"
         misses.append(Miss(float(time[row]), int(missed[row]), float(late[row]), float(took[row]), cause))
+    lockstep = is_lockstep(run)
     count = run.count("CONTROLLER_TIMING")
     total = int(missed.sum())
     waiting = run.field("CONTROLLER_TRACE", "state_is_new") == 0 if "CONTROLLER_TRACE" in run else np.zeros(1, bool)
@@ -413,7 +427,8 @@ def ticks(run: Run) -> Ticks | None:
         without_new_state=int(waiting.sum()),
         without_new_state_share=float(waiting.mean()),
         dropped_states=int(risen(run, "dropped_states").sum()),
-        lockstep=is_lockstep(run),
+        lockstep=lockstep,
+        slip=None if lockstep else slip(run),
         misses=misses,
     )
 

@@ -94,7 +94,7 @@ def _run_facts(run: Run, measured: Metrics) -> list[tuple[str, str]]:
         facts.append(("input hash", info.input_hash))
     found = measured.ticks
     if found is not None:
-        facts.append(("clock", "lockstep" if found.lockstep else "real time"))
+        facts.append(("clock", "lockstep" if found.slip is None else f"real time, {found.slip:.2f} s lost to stalls"))
         facts.append(("ticks", f"{found.count}, missed {found.missed}, without a new state {found.without_new_state}"))
         for miss in found.misses[:4]:
             facts.append(("", f"{miss.ticks} at {miss.at:.2f} s: {miss.cause}"))

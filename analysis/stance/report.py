@@ -159,7 +159,7 @@ def tables(metrics: Metrics) -> list[Table]:
     """The metrics for people, in the order of the report."""
     found = [Table("Motion", ["figure", "value"], _motion(metrics))]
     if metrics.ticks is not None:
-        found.append(Table("Ticks", ["what", "count"], _ticks(metrics.ticks)))
+        found.append(Table("Ticks", ["figure", "value"], _ticks(metrics.ticks)))
     if metrics.timing is not None:
         timing = metrics.timing
         rows = [
@@ -225,6 +225,7 @@ def _ticks(ticks: Ticks) -> list[list[str]]:
         ["deadlines missed", f"{ticks.missed}"],
         ["ticks without a new state", f"{ticks.without_new_state}"],
         ["states that a later one replaced before a tick", f"{ticks.dropped_states}"],
+        ["simulated time lost to stalls", "lockstep" if ticks.slip is None else f"{ticks.slip:.2f} s"],
     ]
 
 

@@ -8,7 +8,7 @@ from stance import metrics
 from stance.log import Log
 from stance.messages import message_type
 from stance.metrics import Percentiles, measure
-from synthetic import PERIOD, Synthetic, encode_log, run_of, ticked
+from synthetic import PERIOD, WALL, Synthetic, encode_log, run_of, ticked
 
 N = 101
 
@@ -113,6 +113,23 @@ def test_missed_ticks_are_counted_and_explained() -> None:
     assert [(miss.at, miss.ticks) for miss in found.misses] == [(pytest.approx(0.4), 2), (pytest.approx(0.8), 1)]
     assert found.misses[0].cause == "woke 21.0 ms late: the machine ran something else"
     assert found.misses[1].cause == "the tick before took 12.0 ms"
+
+
+def test_slip_is_what_the_states_lost_against_the_loggers_clock_and_no_jitter() -> None:
+    synthetic = Synthetic(duration=4.0, pushes=[])
+    late = np.random.default_rng(3).exponential(2_000.0, 401)  # us
+    found = []
+    for lost in (0, 30_000):  # us, from 1.2 s on
+        events = [
+            (received + (lost if received > WALL + 1_200_000 else 0) + int(late[i % 401]), channel, payload)
+            for i, (received, channel, payload) in enumerate(synthetic.events())
+        ]
+        ticks = metrics.ticks(Log.from_bytes(encode_log(events)).run())
+        assert ticks is not None and ticks.slip is not None
+        found.append(ticks.slip)
+    assert found == [pytest.approx(0.0, abs=1e-3), pytest.approx(0.03, abs=1e-3)]
+    in_lockstep = metrics.ticks(Log.from_bytes(Synthetic(duration=1.0, realtime=False).log()).run())
+    assert in_lockstep is not None and in_lockstep.slip is None
 
 
 def test_missed_ticks_add_up_over_a_controller_that_was_started_again() -> None:
