@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -13,6 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from . import configuration, metrics, style
 from .check import Verdict
 from .metrics import Metrics, Percentiles
+from .picture import picture
 from .series import Array, Floats, Run
 from .style import new_figure, shade, styled, time_axis
 
@@ -113,9 +115,6 @@ def _run_facts(run: Run, measured: Metrics) -> list[tuple[str, str]]:
 def timing(run: Run) -> Figure:
     """2: the tick's period and the time of each stage: series, histogram, and tail against the deadline."""
     fig = new_figure(WIDTH, 8.2, "Tick period and time per stage", configuration.title(run))
-    if "CONTROLLER_TIMING" not in run:
-        style.no_data(fig.add_subplot(), "no CONTROLLER_TIMING in the log")
-        return fig
     lockstep = metrics.is_lockstep(run)
     time = run.time("CONTROLLER_TIMING")
     stage = run.field("CONTROLLER_TIMING", "stage_us")
@@ -271,9 +270,6 @@ def _stage_bars(ax: Axes, stage: Array) -> None:
 def center_of_mass(run: Run) -> Figure:
     """3: centre of mass and trunk against their reference: planned, estimated and true."""
     fig = new_figure(WIDTH, 6.6, "Centre of mass and base against reference", configuration.title(run))
-    if "CONTROLLER_TRACE" not in run:
-        style.no_data(fig.add_subplot(), "no CONTROLLER_TRACE in the log")
-        return fig
     axes = fig.subplots(3, 2, sharex=True)
     time = run.time("CONTROLLER_TRACE")
     x, reference = run.field("CONTROLLER_TRACE", "x"), run.field("CONTROLLER_TRACE", "x_ref")
@@ -324,9 +320,6 @@ def forces(run: Run) -> Figure:
     """4: forces of the ground on each foot, planned and true, their share of the friction cone, and the effort."""
     fig = new_figure(WIDTH, 8.6, "Ground reaction forces", configuration.title(run))
     used = metrics.num_contacts(run)
-    if not used or ("FORCE_PLAN" not in run and "TRUTH" not in run):
-        style.no_data(fig.add_subplot(), "no FORCE_PLAN and no TRUTH in the log")
-        return fig
     halves = [slice(0, (used + 1) // 2), slice((used + 1) // 2, used)] if used > 1 else [slice(0, 1)] * 2
     rows = 5 if used > 1 else 6
     grid = fig.add_gridspec(rows, used)
@@ -403,9 +396,6 @@ def gait(run: Run) -> Figure:
         "Gait: planned and measured contacts",
         configuration.title(run),
     )
-    if not used or not kinds:
-        style.no_data(fig.add_subplot(), "no contacts in the log")
-        return fig
     top, bottom = fig.subplots(2, 1, sharex=True, height_ratios=[0.30 * used * len(kinds), 1.1])
     ticks, labels = [], []
     y = 0.0
@@ -455,12 +445,10 @@ def _contact_kinds(run: Run, used: int) -> list[tuple[str, Floats, Array, float]
 @styled
 def joints(run: Run) -> Figure:
     """6: torque, speed and position of each joint as a share of its limit."""
-    fig = new_figure(WIDTH, 7.0, "Joints: share of their limits", configuration.title(run))
     found = metrics.joint_shares(run)
-    if found is None:
-        style.no_data(fig.add_subplot(), "no URDF in the log")
-        return fig
+    assert found is not None
     time, shares, names = found
+    fig = new_figure(WIDTH, 7.0, "Joints: share of their limits", configuration.title(run))
     groups = _joint_groups(names)
     axes = fig.subplots(3, len(groups), sharex=True, sharey="row", squeeze=False)
     for column, (title, members) in enumerate(groups):
@@ -497,9 +485,6 @@ def _joint_groups(names: tuple[str, ...]) -> list[tuple[str, list[int]]]:
 def force_qp(run: Run) -> Figure:
     """7: the force QP: status, iterations, residuals and active constraints of every tick."""
     fig = new_figure(WIDTH, 6.4, "Force QP", configuration.title(run))
-    if "CONTROLLER_TRACE" not in run:
-        style.no_data(fig.add_subplot(), "no CONTROLLER_TRACE in the log")
-        return fig
     time = run.time("CONTROLLER_TRACE")
     status = run.field("CONTROLLER_TRACE", "qp_status")
     ran = status != metrics.QP_NOT_RUN
@@ -555,12 +540,32 @@ def force_qp(run: Run) -> Figure:
     return fig
 
 
-PLOTS: dict[str, Callable[[Run], Figure]] = {
-    "timing": timing,
-    "center_of_mass": center_of_mass,
-    "forces": forces,
-    "gait": gait,
-    "joints": joints,
-    "force_qp": force_qp,
+@dataclass(frozen=True)
+class Plot:
+    """One plot of the report."""
+
+    title: str
+    draw: Callable[[Run], Figure]
+    possible: Callable[[Run], bool]
+    """whether the log holds what it draws: only then may it be drawn"""
+
+
+PLOTS = {
+    "picture": Plot("The robot", picture, lambda run: "TRUTH" in run and configuration.robot(run) is not None),
+    "timing": Plot("Tick period and stage times", timing, lambda run: "CONTROLLER_TIMING" in run),
+    "center_of_mass": Plot("Centre of mass and base", center_of_mass, lambda run: "CONTROLLER_TRACE" in run),
+    "forces": Plot(
+        "Ground reaction forces",
+        forces,
+        lambda run: metrics.num_contacts(run) > 0 and ("FORCE_PLAN" in run or "TRUTH" in run),
+    ),
+    "gait": Plot("Contacts", gait, lambda run: metrics.num_contacts(run) > 0),
+    "joints": Plot("Joints", joints, lambda run: metrics.joint_shares(run) is not None),
+    "force_qp": Plot("Force QP", force_qp, lambda run: "CONTROLLER_TRACE" in run),
 }
-"""name → plot of a run; the summary card also takes the metrics and the verdict"""
+"""name → plot, in the report's order; the summary card also takes the metrics and the verdict"""
+
+
+def available(run: Run) -> dict[str, Plot]:
+    """The plots that the log can give."""
+    return {name: plot for name, plot in PLOTS.items() if plot.possible(run)}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import base64
 from collections.abc import Callable
 from dataclasses import asdict, dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,21 +18,12 @@ from .errors import StanceError
 from .log import Log
 from .messages import CONTROLLER_CHANNELS
 from .metrics import Metrics, Percentiles, Ticks, measure, period
-from .picture import picture
 from .plain import to_json
 from .series import Run
 from .timeline import Event, timeline
 
 SCHEMA = {"schema": "stance.summary", "version": 1}
-TITLES = {
-    "picture": "The robot",
-    "timing": "Tick period and stage times",
-    "center_of_mass": "Centre of mass and base",
-    "forces": "Ground reaction forces",
-    "gait": "Contacts",
-    "joints": "Joints",
-    "force_qp": "Force QP",
-}
+CARD = "summary_card"  # beside the report, not in it: its head and its verdict say the same
 MAX_EVENTS = 400  # rows of the report's table of events
 
 
@@ -88,16 +80,10 @@ def analyse(log: Log, run_id: int | None = None, limits: Path | None = None) -> 
 
 
 def figures(analysis: Analysis) -> dict[str, Callable[[], Figure]]:
-    """name → how to draw it: the summary card, the picture where the log can give it, and every plot."""
+    """name → how to draw it: the summary card, and every plot that the log can give."""
     run = analysis.run
-    found: dict[str, Callable[[], Figure]] = {
-        "summary_card": lambda: plots.summary_card(run, analysis.metrics, analysis.verdict)
-    }
-    if "TRUTH" in run and configuration.robot(run) is not None:
-        found["picture"] = lambda: picture(run)
-    for name, draw in plots.PLOTS.items():
-        found[name] = lambda draw=draw: draw(run)  # type: ignore[misc]
-    return found
+    found = {name: partial(plot.draw, run) for name, plot in plots.available(run).items()}
+    return {CARD: partial(plots.summary_card, run, analysis.metrics, analysis.verdict), **found}
 
 
 def write_plots(analysis: Analysis, directory: Path, only: list[str] | None = None, kind: str = "png") -> list[Path]:
@@ -121,7 +107,7 @@ def write(analysis: Analysis, directory: Path) -> Written:
     summary = directory / "summary.json"
     summary.write_text(to_json(analysis.summary()) + "\n")
     report = directory / "report.html"
-    report.write_text(render(analysis, {image.stem: image.read_bytes() for image in images}))
+    report.write_text(render(analysis, {path.stem: path.read_bytes() for path in images if path.stem != CARD}))
     return Written(report, summary, directory / "plots")
 
 
@@ -131,7 +117,8 @@ def render(analysis: Analysis, images: dict[str, bytes]) -> str:
         loader=jinja2.PackageLoader("stance"), autoescape=True, undefined=jinja2.StrictUndefined, trim_blocks=True
     )
     embedded = {
-        name: "data:image/png;base64," + base64.b64encode(data).decode("ascii") for name, data in images.items()
+        plots.PLOTS[name].title: "data:image/png;base64," + base64.b64encode(data).decode("ascii")
+        for name, data in images.items()
     }
     return environment.get_template("report.html.j2").render(
         analysis=analysis,
@@ -143,7 +130,6 @@ def render(analysis: Analysis, images: dict[str, bytes]) -> str:
         events=analysis.events[:MAX_EVENTS],
         hidden_events=max(len(analysis.events) - MAX_EVENTS, 0),
         images=embedded,
-        titles=TITLES,
         version=__version__,
     )
 

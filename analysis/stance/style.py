@@ -181,11 +181,3 @@ def time_axis(axes: Sequence[Axes], run: Run) -> None:
     for ax in axes:
         ax.set_xlim(run.span[0], max(run.span[1], run.span[0] + 1e-3))
     axes[-1].set_xlabel("time [s]")
-
-
-def no_data(ax: Axes, text: str) -> None:
-    """Says in an empty place what the log lacks."""
-    ax.text(0.5, 0.5, text, transform=ax.transAxes, ha="center", va="center", color=MUTED)
-    ax.set_xticks([])
-    ax.set_yticks([])
-    ax.grid(False)

@@ -90,7 +90,7 @@ def test_json_has_null_for_what_is_not_finite_and_says_so(tmp_path: Path, capsys
 def test_report_writes_its_files(
     small: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr(plots, "PLOTS", {"gait": plots.gait})  # one is enough here
+    monkeypatch.setattr(plots, "PLOTS", {"gait": plots.PLOTS["gait"]})  # one is enough here
     assert main(["report", small, "--out", str(tmp_path), "--json"]) == 0
     result = json.loads(capsys.readouterr().out)
     assert all(Path(result[name]).exists() for name in ("report", "summary", "plots"))

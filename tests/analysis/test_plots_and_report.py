@@ -52,14 +52,26 @@ def any_run(request: pytest.FixtureRequest) -> tuple[str, Run]:
 
 
 @pytest.mark.parametrize("name", ["summary_card", *plots.PLOTS])
-def test_every_plot_draws_without_a_warning(name: str, any_run: tuple[str, Run]) -> None:
+def test_every_plot_that_is_possible_draws_without_a_warning(name: str, any_run: tuple[str, Run]) -> None:
     kind, run = any_run
+    if name != "summary_card" and not plots.PLOTS[name].possible(run):
+        pytest.skip("not in this log")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        figure = plots.summary_card(run, measure(run)) if name == "summary_card" else plots.PLOTS[name](run)
+        figure = plots.summary_card(run, measure(run)) if name == "summary_card" else plots.PLOTS[name].draw(run)
         assert isinstance(figure, Figure)
         if kind in RENDERED:
             assert style.render(figure, dpi=30).startswith(b"\x89PNG")
+
+
+def test_a_plot_is_offered_where_the_log_can_give_it(stand: Run) -> None:
+    assert plots.available(stand) == plots.PLOTS
+    assert set(plots.PLOTS) - set(plots.available(without_truth())) == {"picture"}
+    rollout = run_of(
+        {name: rows for name, rows in Synthetic(duration=0.5).messages().items() if name != "CONTROLLER_TIMING"}
+    )
+    assert set(plots.PLOTS) - set(plots.available(rollout)) == {"timing"}
+    assert set(plots.available(lonely())) == {"gait", "joints"}
 
 
 def test_the_same_run_gives_the_same_picture_byte_for_byte(stand: Run) -> None:
@@ -141,7 +153,7 @@ def test_a_run_ends_with_the_tick_of_its_last_state_and_the_truth_after_it() -> 
 
 
 def test_every_plot_lies_beside_the_report(written: Path) -> None:
-    assert {path.stem for path in (written / "plots").iterdir()} == {"summary_card", "picture", *plots.PLOTS}
+    assert {path.stem for path in (written / "plots").iterdir()} == {"summary_card", *plots.PLOTS}
 
 
 def test_what_a_log_says_is_escaped(stand: Run) -> None:
