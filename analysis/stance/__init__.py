@@ -9,4 +9,6 @@ Modules: `log` reads, `series` holds, `metrics` and `check` judge, `plots` and `
 `replay` and `network` speak LCM; `cli` is the command `stance`.
 """
 
-__version__ = "0.1.0"
+from importlib.metadata import version
+
+__version__ = version("stance")

@@ -28,7 +28,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Runs one command; returns its exit code."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     options = _parser().parse_args(given)
-    options.given = given
+    options.restart = ["-m", "stance", *given]
     command: Command = options.command
     try:
         return command(options)
@@ -57,7 +57,7 @@ def _run(options: argparse.Namespace) -> int:
 
     if options.limits is not None:
         load_limits(options.limits)  # a list that cannot be used is told before the run, not after it
-    ensure(options.network, options.given)
+    ensure(options.network, options.restart)
     name = f"{time.strftime('%Y%m%d-%H%M%S')}-{options.robot}-{Path(options.scenario).stem}"
     request = RunRequest(
         out=options.out or _fresh_directory(name),
@@ -183,7 +183,7 @@ def _replay(options: argparse.Namespace) -> int:
 
     log = Log.open(options.log)
     rows = select(log, options.channels, options.first, options.last)
-    ensure(options.network, options.given)
+    ensure(options.network, options.restart)
     with announced("stance replay"), progress_bar(options.silent) as progress:
         done_playing = replay(log, rows, options.speed, progress=progress)
     result = {

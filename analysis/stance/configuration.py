@@ -38,15 +38,6 @@ def friction(run: Run) -> float | None:
     return float(found) if isinstance(found, int | float) else None
 
 
-def scenario(run: Run) -> dict[str, Any]:
-    """The simulator's scenario; empty where the log has none."""
-    try:
-        found = yaml.safe_load(run.simulator.scenario) if run.simulator is not None else None
-    except yaml.YAMLError:
-        found = None
-    return found if isinstance(found, dict) else {}
-
-
 def robot(run: Run) -> Robot | None:
     """The robot's body, its joints in the order of every joint vector; None where the log has no URDF."""
     for info in (run.controller, run.simulator):
@@ -64,13 +55,16 @@ def foot_names(run: Run, count: int) -> list[str]:
     return [str(names[i]) if i < len(names) else f"contact {i}" for i in range(count)]
 
 
-def option(run: Run, name: str) -> str | None:
-    """What followed an option such as --scenario on the simulator's (or the rollout's) command line."""
-    for info in (run.simulator, run.controller):
-        words = info.options.split() if info is not None else []
-        if name in words[:-1]:
-            return words[words.index(name) + 1]
-    return None
+def option(words: str, name: str) -> str | None:
+    """What follows an option such as --scenario on a command line."""
+    found = words.split()
+    return found[found.index(name) + 1] if name in found[:-1] else None
+
+
+def run_option(run: Run, name: str) -> str | None:
+    """The same on the simulator's (or the rollout's) command line."""
+    infos = [info for info in (run.simulator, run.controller) if info is not None]
+    return next((found for info in infos if (found := option(info.options, name)) is not None), None)
 
 
 def title(run: Run) -> str:
@@ -83,4 +77,4 @@ def title(run: Run) -> str:
 
 def scenario_name(run: Run) -> str:
     """Of the scenario that ran, without path and suffix; empty where the log does not say."""
-    return Path(option(run, "--scenario") or "").stem
+    return Path(run_option(run, "--scenario") or "").stem

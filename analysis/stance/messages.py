@@ -102,9 +102,3 @@ def message_type(name: str) -> MessageType:
         if found.name == name:
             return found
     raise KeyError(name)
-
-
-def constants(type_name: str, names: tuple[str, ...]) -> dict[int, str]:
-    """value → lower-case name of constants of a type, as in `constants("controller_trace_t", ("RUN", "HOLD"))`."""
-    python_class = message_type(type_name).python_class
-    return {int(getattr(python_class, name)): name.lower() for name in names}

@@ -463,7 +463,7 @@ def force_qp(run: Run) -> ForceQp | None:
     ran = status != QP_NOT_RUN
     effort = run.field("CONTROLLER_TRACE", "effort")[ran]
 
-    def largest(name: str) -> float:
+    def residual(name: str) -> float:
         values = run.field("CONTROLLER_TRACE", name)[ran]
         return float(values.max(initial=0.0)) if np.isfinite(values).all() else float("inf")
 
@@ -471,8 +471,8 @@ def force_qp(run: Run) -> ForceQp | None:
         status={_name(QP_STATUS, value): int((status == value).sum()) for value in np.unique(status).tolist()},
         failures=int((ran & (status != QP_SOLVED)).sum()),
         iterations=Percentiles.of(run.field("CONTROLLER_TRACE", "qp_iterations")[ran]),
-        primal_residual_max=largest("qp_primal_residual"),
-        dual_residual_max=largest("qp_dual_residual"),
+        primal_residual_max=residual("qp_primal_residual"),
+        dual_residual_max=residual("qp_dual_residual"),
         active_max=int(run.field("CONTROLLER_TRACE", "qp_active").max(initial=0)),
         effort_mean=float(effort.mean()) if len(effort) else 0.0,
         effort_max=float(effort.max(initial=0.0)),
@@ -532,9 +532,9 @@ def friction(run: Run) -> Friction:
     mu = configuration.friction(run)
     share = ratio = None
     if "FORCE_PLAN" in run and mu:
-        share = _nanmax(planned_cone_share(run, mu))
+        share = largest(planned_cone_share(run, mu))
     if "TRUTH" in run:
-        ratio = _nanmax(friction_ratio(run.field("TRUTH", "f_F_W")[:, : num_contacts(run)]))
+        ratio = largest(friction_ratio(run.field("TRUTH", "f_F_W")[:, : num_contacts(run)]))
     return Friction(mu, share, ratio)
 
 
@@ -585,10 +585,10 @@ def joints(run: Run) -> Joints | None:
         return None
     _, shares, names = found
     each = [
-        JointUse(name, *(_nanmax(shares[quantity][:, i]) for quantity in ("torque", "speed", "position")))
+        JointUse(name, *(largest(shares[quantity][:, i]) for quantity in ("torque", "speed", "position")))
         for i, name in enumerate(names)
     ]
-    worst = [_nanmax(shares[quantity]) for quantity in ("torque", "speed", "position")]
+    worst = [largest(shares[quantity]) for quantity in ("torque", "speed", "position")]
     return Joints(worst[0], worst[1], worst[2], each)
 
 
@@ -713,7 +713,8 @@ def _rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else 0.0
 
 
-def _nanmax(values: Array) -> float | None:
+def largest(values: Array) -> float | None:
+    """Of those that are numbers; None where none is."""
     finite = values[~np.isnan(values)]
     return float(finite.max()) if finite.size else None
 

@@ -24,7 +24,6 @@ from .errors import MissingError
 
 LCM_URL = "udpm://239.255.76.67:7667?ttl=0"
 MULTICAST_GROUP = "239.255.76.67"
-MODES = ("auto", "namespace", "host")
 INSIDE = "STANCE_NETWORK_NAMESPACE"
 """environment variable that is set within a namespace of ours"""
 RUNTIME_DIRECTORY = "STANCE_RUNTIME_DIR"
@@ -92,7 +91,7 @@ def refusal() -> str:
 def ensure(mode: str, arguments: Sequence[str]) -> None:
     """Makes LCM's network usable for this process, or raises MissingError with what to do.
 
-    Where that takes a namespace, this process is replaced: `python -m stance` with the same arguments starts in it.
+    Where that takes a namespace, this process is replaced: Python starts again in it, with these arguments.
     """
     if os.environ.get(INSIDE):
         return
@@ -109,7 +108,7 @@ def ensure(mode: str, arguments: Sequence[str]) -> None:
     os.environ[RUNTIME_DIRECTORY] = str(runtime_directory())
     sys.stdout.flush()
     sys.stderr.flush()
-    os.execvp(command[0], [*command, sys.executable, "-m", "stance", *arguments])
+    os.execvp(command[0], [*command, sys.executable, *arguments])
 
 
 # ---- who lives in a namespace ----------------------------------------------------------------------------------------

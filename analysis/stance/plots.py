@@ -88,7 +88,7 @@ def _run_facts(run: Run, measured: Metrics) -> list[tuple[str, str]]:
         if info is not None:
             facts.append((name, f"{info.program} {info.version}"))
             facts.append(("", f"{info.source}, {info.build}"))
-    seed = run.simulator.seed if run.simulator is not None else configuration.option(run, "--seed")
+    seed = run.simulator.seed if run.simulator is not None else configuration.run_option(run, "--seed")
     if seed is not None:
         facts.append(("seed", str(seed)))
     info = run.controller or run.simulator
@@ -458,7 +458,7 @@ def joints(run: Run) -> Figure:
                 values = shares[quantity][:, joint]
                 ax.plot(time, values, color=style.JOINTS[place % 8], lw=1.0, label=names[joint])
             ax.axhline(1.0, color=style.BAD, lw=0.9)
-            largest = metrics._nanmax(shares[quantity])
+            largest = metrics.largest(shares[quantity])
             ax.set_ylim(0.0, max(1.18, 1.05 * min(largest or 0.0, 3.0)))
             if largest is not None and largest < 0.3:
                 ax.set_ylim(0.0, max(1.25 * largest, 0.02))

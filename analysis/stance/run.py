@@ -15,6 +15,7 @@ from pathlib import Path
 from types import FrameType, TracebackType
 from typing import Any
 
+from .configuration import option
 from .errors import RunError
 from .messages import SELF_TEST_CHANNEL, message_type
 from .network import LCM_URL, announced
@@ -79,8 +80,6 @@ class RunOutcome:
     interrupted: bool
     simulated: float
     """s, that were heard of over LCM"""
-    wall: float
-    """s"""
     notes: list[str] = field(default_factory=list)
     """what the programs said on stderr, a line each"""
 
@@ -100,7 +99,6 @@ def record(request: RunRequest, progress: Progress | None = None) -> RunOutcome:
     if log.exists():
         raise RunError(f"{log} is there already: choose another --out, or remove it")
     request.out.mkdir(parents=True, exist_ok=True)
-    started = time.monotonic()
     try:
         listener = _Listener(lcm.LCM(request.url))
     except RuntimeError as error:
@@ -136,7 +134,6 @@ def record(request: RunRequest, progress: Progress | None = None) -> RunOutcome:
         fell=exit_code == FELL,
         interrupted=exit_code is None,
         simulated=listener.simulated,
-        wall=time.monotonic() - started,
         notes=notes,
     )
 
@@ -270,10 +267,8 @@ def _duration(run_info: bytes) -> float | None:
 
     with contextlib.suppress(ValueError, TypeError, LookupError, AttributeError, struct.error, yaml.YAMLError):
         info = message_type("run_info_t").python_class.decode(run_info)
-        words = info.options.split()
-        if "--duration" in words[:-1]:
-            return float(words[words.index("--duration") + 1])
-        return float(yaml.safe_load(info.scenario)["duration"])
+        asked = option(info.options, "--duration")
+        return float(asked or yaml.safe_load(info.scenario)["duration"])
     return None
 
 

@@ -23,7 +23,6 @@ MUTED = "#6b7785"
 FAINT = "#c9d1d9"
 GRID = "#e6eaee"
 PAPER = "#ffffff"
-PANEL = "#f5f7f9"
 
 GOOD = "#23804a"
 BAD = "#c02f2a"

@@ -8,25 +8,25 @@ from __future__ import annotations
 
 import argparse
 import json
-import os
 import re
 import shutil
 import subprocess
 import sys
 import tempfile
+from dataclasses import asdict
 from pathlib import Path
 
 import numpy as np
-from stance import network
+from stance.errors import StanceError
 from stance.log import Log
+from stance.metrics import STAGES, Percentiles
+from stance.network import ensure
 from stance.run import RunRequest, record
-
-STAGES = ("decode", "validate", "estimate", "plan", "model", "force_qp", "torque", "safety", "encode")
-SHARES = (50.0, 99.0, 99.9, 100.0)
 
 
 def percentiles(values: np.ndarray) -> dict[str, float]:
-    return dict(zip(("p50", "p99", "p99.9", "max"), np.percentile(values, SHARES).tolist(), strict=True))
+    found = Percentiles.of(values)
+    return asdict(found) if found is not None else {}
 
 
 def measure(seconds: float) -> dict[str, dict[str, float]]:
@@ -52,7 +52,7 @@ def histogram(text: str) -> dict[str, float]:
     """Percentiles [us] of cyclictest's histogram."""
     rows = [line.split() for line in text.splitlines() if re.match(r"^\d{6}\s+\d+", line)]
     late = np.repeat([int(row[0]) for row in rows], [int(row[1]) for row in rows])
-    return percentiles(late) if len(late) else {}
+    return percentiles(late)
 
 
 def main() -> None:
@@ -60,19 +60,17 @@ def main() -> None:
     parser.add_argument("seconds", nargs="?", type=float, default=20.0)
     parser.add_argument("--json", type=Path)
     options = parser.parse_args()
-    if not os.environ.get(network.INSIDE) and not network.host_is_loopback():
-        command = network.namespace_command()
-        if command is None:
-            sys.exit(network.refusal())
-        os.environ[network.INSIDE] = "1"
-        os.execvp(command[0], [*command, sys.executable, *sys.argv])
+    try:
+        ensure("auto", sys.argv)
+    except StanceError as error:
+        sys.exit(str(error))
     result = measure(options.seconds)
     if options.json:
         options.json.write_text(json.dumps(result, indent=2))
     print(f"{'us':<14}{'p50':>9}{'p99':>9}{'p99.9':>9}{'max':>9}")
     for name, values in result.items():
         if "p50" in values:
-            print(f"{name:<14}" + "".join(f"{values[key]:>9.1f}" for key in ("p50", "p99", "p99.9", "max")))
+            print(f"{name:<14}" + "".join(f"{values[key]:>9.1f}" for key in ("p50", "p99", "p99_9", "max")))
     print(f"missed ticks: {result['missed']['ticks']:.0f}")
     if "cyclictest" not in result:
         print("cyclictest is not installed: apt-get install rt-tests to see this machine's own wake-ups beside")

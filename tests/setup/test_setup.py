@@ -1,11 +1,13 @@
-"""What set-up says where it cannot go on."""
+"""What set-up says where it cannot go on, and the version that it installs."""
 
 from __future__ import annotations
 
+import re
 import shutil
 import subprocess
 from pathlib import Path
 
+import stance
 from stance.programs import SOURCE_TREE
 
 
@@ -30,3 +32,8 @@ def test_without_root_or_sudo_one_line_names_the_packages_and_the_remedy(tmp_pat
     assert done.stderr.startswith("setup: needs root to install ")
     assert "cmake" in done.stderr and "install sudo" in done.stderr
     assert done.stderr.count("\n") == 1
+
+
+def test_the_libraries_and_the_python_package_are_of_one_version() -> None:
+    found = re.search(r"project\(stance VERSION (\S+)", (SOURCE_TREE / "CMakeLists.txt").read_text())
+    assert found is not None and found[1] == stance.__version__
