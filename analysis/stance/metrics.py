@@ -13,6 +13,7 @@ import numpy as np
 from . import configuration
 from .messages import CHANNELS, OPERATOR_CHANNELS
 from .series import Array, Floats, Integers, Run, match
+from .urdf import rotation_from_quaternion
 
 if TYPE_CHECKING:
     from .log import LogReport
@@ -311,16 +312,22 @@ def period(run: Run) -> float:
     return float(np.median(steps)) * 1e-6 if len(steps) else 0.01
 
 
+def z_axis(quat_WB: Array) -> Floats:
+    """B's z axis in W: (..., 4) → (..., 3)."""
+    return rotation_from_quaternion(quat_WB)[..., 2]
+
+
 def tilt(quat_WB: Array) -> Floats:
     """rad, angle of B's z axis from W's: (..., 4) → (...)."""
-    w, x, y, z = np.moveaxis(np.asarray(quat_WB, float), -1, 0)
-    return np.asarray(np.arctan2(2 * np.hypot(x * z + w * y, y * z - w * x), 1 - 2 * (x * x + y * y)))
+    z = z_axis(quat_WB)
+    return np.asarray(np.arctan2(np.hypot(z[..., 0], z[..., 1]), z[..., 2]))
 
 
-def yaw(quat_WB: Array) -> Floats:
-    """rad, heading: (..., 4) → (...)."""
-    w, x, y, z = np.moveaxis(np.asarray(quat_WB, float), -1, 0)
-    return np.asarray(np.arctan2(2 * (x * y + w * z), 1 - 2 * (y * y + z * z)))
+def roll_pitch_yaw(quat_WB: Array) -> Floats:
+    """rad, of R = Rz(yaw) Ry(pitch) Rx(roll): (..., 4) → (..., 3)."""
+    R = rotation_from_quaternion(quat_WB)
+    roll, yaw = np.arctan2(R[..., 2, 1], R[..., 2, 2]), np.arctan2(R[..., 1, 0], R[..., 0, 0])
+    return np.stack([roll, np.arcsin(np.clip(-R[..., 2, 0], -1.0, 1.0)), yaw], axis=-1)
 
 
 def fall(run: Run) -> float | None:
@@ -607,7 +614,7 @@ def estimator_error(run: Run) -> EstimatorError | None:
     distance = np.linalg.norm(error, axis=1)
     v_estimate, v_truth = both("v_WB")
     q_estimate, q_truth = both("quat_WB")
-    turned = np.degrees(np.angle(np.exp(1j * (yaw(q_estimate) - yaw(q_truth)))))
+    turned = np.degrees(np.angle(np.exp(1j * (roll_pitch_yaw(q_estimate) - roll_pitch_yaw(q_truth))[:, 2])))
     return EstimatorError(
         position_rms=_rms(distance),
         position_max=float(distance.max()),
@@ -700,11 +707,6 @@ def intervals(active: Array) -> list[tuple[int, int]]:
 
 def _tilt_between(first: Array, second: Array) -> Floats:
     """rad, between the z axes of two series of quaternions (n, 4)."""
-
-    def z_axis(q: Array) -> Array:
-        w, x, y, z = np.moveaxis(np.asarray(q, float), -1, 0)
-        return np.stack([2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)], axis=-1)
-
     a, b = z_axis(first), z_axis(second)
     return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)))
 

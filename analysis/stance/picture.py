@@ -12,6 +12,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon
+from scipy.spatial import ConvexHull
 
 from . import configuration, metrics, style
 from .errors import UnreadableError
@@ -248,9 +249,8 @@ def _shape(ax: Axes, T: Array, shape: Shape, plane: Array, colour: str, alpha: f
     if shape.kind == "box":
         corners = np.array(np.meshgrid(*[[-0.5 * size, 0.5 * size] for size in shape.size])).reshape(3, -1)
         points = (T[:3, :3] @ corners + T[:3, 3:]).T @ plane.T
-        ax.add_patch(
-            Polygon(_hull(points), closed=True, fc=colour, ec=LINK_COLOUR, lw=1.2, alpha=alpha, zorder=order + 1)
-        )
+        outline = points[ConvexHull(points).vertices]
+        ax.add_patch(Polygon(outline, closed=True, fc=colour, ec=LINK_COLOUR, lw=1.2, alpha=alpha, zorder=order + 1))
     elif shape.kind == "cylinder":
         radius, length = shape.size
         ends = np.array([T[:3, 3] - 0.5 * length * T[:3, 2], T[:3, 3] + 0.5 * length * T[:3, 2]]) @ plane.T
@@ -313,22 +313,3 @@ def _force_labels(ax: Axes, pose: Pose, plane: Array) -> None:
             va="top",
             zorder=20,
         )
-
-
-def _hull(points: Array) -> Array:
-    """Convex hull of points (n, 2), counter-clockwise."""
-    ordered = sorted(map(tuple, points.tolist()))
-
-    def half(sequence: list[tuple[float, ...]]) -> list[tuple[float, ...]]:
-        kept: list[tuple[float, ...]] = []
-        for point in sequence:
-            while len(kept) > 1 and _turns_right(kept[-2], kept[-1], point):
-                kept.pop()
-            kept.append(point)
-        return kept[:-1]
-
-    return np.array(half(ordered) + half(ordered[::-1]))
-
-
-def _turns_right(a: tuple[float, ...], b: tuple[float, ...], c: tuple[float, ...]) -> bool:
-    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) <= 0.0

@@ -286,7 +286,8 @@ def center_of_mass(run: Run) -> Figure:
     for row, angle in enumerate(("roll", "pitch", "yaw")):
         ax = axes[row, 1]
         if truth_time is not None:
-            ax.plot(truth_time, np.degrees(_rpy(run.field("TRUTH", "quat_WB"))[:, row]), color=style.TRUTH, lw=1.8)
+            true = np.degrees(metrics.roll_pitch_yaw(run.field("TRUTH", "quat_WB"))[:, row])
+            ax.plot(truth_time, true, color=style.TRUTH, lw=1.8)
         ax.plot(time, np.degrees(x[:, row]), color=style.ESTIMATE, lw=0.9)
         ax.plot(time, np.degrees(reference[:, row]), color=style.REFERENCE, lw=1.0, ls=(0, (5, 2)))
         ax.set_ylabel(f"{angle} [°]")
@@ -297,14 +298,6 @@ def center_of_mass(run: Run) -> Figure:
         time_axis(list(axes[:, column]), run)
     axes[0, 1].legend(*axes[0, 0].get_legend_handles_labels(), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
     return fig
-
-
-def _rpy(quaternion: Array) -> Floats:
-    """rad, roll, pitch, yaw of R = Rz Ry Rx: (n, 4) → (n, 3)."""
-    w, x, y, z = np.moveaxis(np.asarray(quaternion, float), -1, 0)
-    roll = np.arctan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y))
-    pitch = np.arcsin(np.clip(2 * (w * y - z * x), -1.0, 1.0))
-    return np.stack([roll, pitch, metrics.yaw(quaternion)], axis=-1)
 
 
 def _at_least(ax: Axes, span: float) -> None:

@@ -15,6 +15,7 @@ from random import Random
 from typing import Any
 
 import yaml
+from scipy.stats import binomtest
 
 from .errors import RunError, StanceError
 from .programs import SOURCE_TREE, find_program
@@ -65,16 +66,6 @@ class Cell:
     """rad, the largest of those that survived"""
 
 
-def wilson(successes: int, trials: int, z: float = 1.959963984540054) -> tuple[float, float]:
-    """Wilson's score interval of a rate; (0, 1) for no trials."""
-    if trials == 0:
-        return 0.0, 1.0
-    rate, z2 = successes / trials, z * z
-    middle = (rate + z2 / (2 * trials)) / (1 + z2 / trials)
-    half = z / (1 + z2 / trials) * math.sqrt(rate * (1 - rate) / trials + z2 / (4 * trials * trials))
-    return max(0.0, middle - half), min(1.0, middle + half)
-
-
 def standing_pushes(
     scenario: str,
     scales: Sequence[float],
@@ -113,7 +104,8 @@ def summarise(trials: Sequence[Trial]) -> list[Cell]:
         here = [trial for trial in trials if trial.scale == scale]
         stood = [trial for trial in here if not trial.fallen]
         tilt = max((trial.max_tilt for trial in stood), default=0.0)
-        cells.append(Cell(scale, len(here), len(stood), wilson(len(stood), len(here)), tilt))
+        interval = binomtest(len(stood), len(here)).proportion_ci(0.95, method="wilson")
+        cells.append(Cell(scale, len(here), len(stood), (float(interval.low), float(interval.high)), tilt))
     return cells
 
 

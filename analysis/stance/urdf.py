@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from .errors import UnreadableError
 from .series import Array, Floats
@@ -116,26 +117,16 @@ class Robot:
 
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Floats:
     """R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3); angles in rad."""
-    cr, sr, cp, sp, cy, sy = np.cos(roll), np.sin(roll), np.cos(pitch), np.sin(pitch), np.cos(yaw), np.sin(yaw)
-    return np.array(
-        [
-            [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
-            [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
-            [-sp, cp * sr, cp * cr],
-        ]
-    )
+    return np.asarray(Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix())
 
 
 def rotation_from_quaternion(quaternion: Array) -> Floats:
-    """R of unit quaternions (w, x, y, z): (..., 4) → (..., 3, 3)."""
+    """R of quaternions (w, x, y, z): (..., 4) → (..., 3, 3); nan where one is zero or not finite."""
     q = np.asarray(quaternion, float)
-    w, x, y, z = np.moveaxis(q / np.linalg.norm(q, axis=-1, keepdims=True), -1, 0)
-    rows = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+    norm = np.linalg.norm(q, axis=-1, keepdims=True)
+    good = np.isfinite(norm) & (norm > 0.0)
+    R = Rotation.from_quat(np.where(good, q, [1.0, 0.0, 0.0, 0.0]), scalar_first=True).as_matrix()
+    return np.where(good[..., None], R, np.nan)
 
 
 def transform(rotation: Array, position: Array) -> Floats:
@@ -223,6 +214,4 @@ def _motion(joint: Joint, value: float) -> Floats:
         return transform(np.eye(3), joint.axis * value)
     if joint.kind not in MOVING:
         return np.eye(4)
-    x, y, z = joint.axis
-    skew = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-    return transform(np.eye(3) + np.sin(value) * skew + (1 - np.cos(value)) * skew @ skew, np.zeros(3))
+    return transform(Rotation.from_rotvec(value * joint.axis).as_matrix(), np.zeros(3))

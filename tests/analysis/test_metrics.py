@@ -69,7 +69,15 @@ def test_tilt_does_not_see_yaw() -> None:
     run = run_of(base(TRUTH=messages))
     found = metrics.trunk(run)
     assert found is not None and found.tilt_max_deg == pytest.approx(0.0, abs=1e-9)
-    assert metrics.yaw(run.field("TRUTH", "quat_WB"))[0] == pytest.approx(1.4)
+    assert metrics.roll_pitch_yaw(run.field("TRUTH", "quat_WB"))[0] == pytest.approx([0.0, 0.0, 1.4])
+
+
+def test_an_orientation_that_is_none_is_told_and_breaks_nothing() -> None:
+    messages = truth()
+    messages["quat_WB"][30], messages["quat_WB"][40] = np.nan, 0.0
+    found = metrics.trunk(run_of(base(TRUTH=messages)))
+    assert found is not None and np.isnan(found.tilt_max_deg)
+    assert np.isnan(metrics.tilt(messages["quat_WB"])).nonzero()[0].tolist() == [30, 40]
 
 
 def test_a_fall_is_when_the_truth_says_so() -> None:

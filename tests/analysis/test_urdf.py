@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 from stance import configuration
 from stance.errors import UnreadableError
+from stance.metrics import roll_pitch_yaw
 from stance.series import Run
 from stance.urdf import parse_urdf, rotation_from_quaternion, rotation_from_rpy, transform
 from synthetic import URDF
@@ -67,6 +69,9 @@ def test_the_whole_body_turns_with_its_base() -> None:
 
 def test_quaternions_and_angles_agree() -> None:
     half = 0.3 / 2
+    angles = [0.1, -0.2, 0.7]
+    q = Rotation.from_matrix(rotation_from_rpy(*angles)).as_quat(scalar_first=True)
+    assert roll_pitch_yaw(q) == pytest.approx(angles)
     assert rotation_from_quaternion(np.array([np.cos(half), 0, np.sin(half), 0])) == pytest.approx(
         rotation_from_rpy(0.0, 0.3, 0.0)
     )
