@@ -115,7 +115,7 @@ def picture(run: Run, instants: Sequence[float] | None = None, view: str | None 
             words = f"t = {pose.time:.2f} s   tilt {np.degrees(pose.tilt):.1f}°"
             ax.set_title(words, fontsize=9, fontweight="normal", loc="center")
         if label:
-            axes[row, 0].set_ylabel(f"{label}, seen from the {seen}", fontsize=9, color="#8a5a00", labelpad=6)
+            axes[row, 0].set_ylabel(f"{label}, seen from the {seen}", fontsize=9, color=style.PUSH_INK, labelpad=6)
     _key(axes[-1, 0], mu)
     return fig
 
@@ -192,7 +192,7 @@ def draw(
             0.5 * (start[0] + edge[0]),
             start[1] + 0.045,
             f"{size:.0f} N",
-            color="#8a5a00",
+            color=style.PUSH_INK,
             fontsize=8.5,
             ha="center",
             zorder=20,

@@ -29,6 +29,7 @@ BAD = "#c02f2a"
 MINUS = "\N{MINUS SIGN}"
 
 PUSH = "#f2b134"
+PUSH_INK = "#8a5a00"
 SAFETY = "#c02f2a"
 
 REFERENCE = "#1d2733"
@@ -123,38 +124,38 @@ def new_figure(width: float, height: float, title: str, subtitle: str = "") -> F
 
 def shade(axes: Axes | Sequence[Axes], run: Run, label: bool = False) -> None:
     """Behind a time axis: pushes, the time in which safety did not let the robot run, and the fall."""
-    found = metrics.pushes(run)
-    stops = _unsafe(run)
+    spans = [(push.start, push.start + push.duration, PUSH, 0.45) for push in metrics.pushes(run)]
+    spans += [(first, last, SAFETY, 0.10) for first, last in _unsafe(run)]
     fell = metrics.fall(run)
-    for place, ax in enumerate([axes] if isinstance(axes, Axes) else axes):
-        for push in found:
-            ax.axvspan(push.start, push.start + push.duration, color=PUSH, alpha=0.45, lw=0, zorder=0)
-            if label and place == 0:
-                ax.annotate(
-                    push_text(push),
-                    (push.start + push.duration, 1.0),
-                    xycoords=("data", "axes fraction"),
-                    xytext=(3, -2),
-                    textcoords="offset points",
-                    va="top",
-                    fontsize=7.5,
-                    color="#8a5a00",
-                )
-        for first, last in stops:
-            ax.axvspan(first, last, facecolor=SAFETY, alpha=0.10, lw=0, zorder=0)
+    axes = [axes] if isinstance(axes, Axes) else axes
+    for ax in axes:
+        for first, last, colour, alpha in spans:
+            # The edge shows what is shorter than a pixel, over the grid.
+            ax.axvspan(first, last, fc=(colour, alpha), ec=(colour, 0.7), lw=0.7, zorder=0.6)
         if fell is not None:
             ax.axvline(fell, color=BAD, lw=1.2, ls=(0, (4, 2)), zorder=1)
-            if label and place == 0:
-                ax.annotate(
-                    "fell",
-                    (fell, 0.0),
-                    xycoords=("data", "axes fraction"),
-                    xytext=(-3, 3),
-                    textcoords="offset points",
-                    ha="right",
-                    fontsize=7.5,
-                    color=BAD,
-                )
+    if label:
+        for push in metrics.pushes(run):
+            _beside(axes[0], run, (push.start, push.start + push.duration), 1.0, push_text(push), PUSH_INK)
+        if fell is not None:
+            _beside(axes[0], run, (fell, fell), 0.0, "fell", BAD)
+
+
+def _beside(ax: Axes, run: Run, span: tuple[float, float], height: float, text: str, colour: str) -> None:
+    """Words at the right of what happened in `span` [s]; at its left where they would leave the axes."""
+    left = span[1] - run.span[0] > 0.8 * run.duration
+    words = ax.annotate(
+        text,
+        (span[0] if left else span[1], height),
+        xycoords=("data", "axes fraction"),
+        xytext=(-3 if left else 3, 3 if height == 0.0 else -2),
+        textcoords="offset points",
+        ha="right" if left else "left",
+        va="bottom" if height == 0.0 else "top",
+        fontsize=7.5,
+        color=colour,
+    )
+    words.set_in_layout(False)
 
 
 def push_text(push: metrics.Push) -> str:
@@ -174,9 +175,10 @@ def _unsafe(run: Run) -> list[tuple[float, float]]:
 
 
 def time_axis(axes: Sequence[Axes], run: Run) -> None:
-    """Shares the run's time over a column of axes; only the lowest is labelled."""
+    """Shares the run's time, its last state's period included, over a column of axes; only the lowest is labelled."""
+    first, last = run.span
     for ax in axes[:-1]:
         ax.tick_params(labelbottom=False)
     for ax in axes:
-        ax.set_xlim(run.span[0], max(run.span[1], run.span[0] + 1e-3))
+        ax.set_xlim(first, last + metrics.period(run))
     axes[-1].set_xlabel("time [s]")

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from stance import plots, style
 from stance.errors import StanceError, UnreadableError
@@ -85,6 +87,30 @@ def test_plots_leave_matplotlibs_settings_alone(stand: Run) -> None:
     before = dict(matplotlib.rcParams)
     style.render(plots.gait(stand), dpi=30)
     assert dict(matplotlib.rcParams) == before
+
+
+def shaded(run: Run) -> tuple[Axes, np.ndarray]:
+    """An axis with nothing but what is shaded, and its figure's pixels."""
+    figure = style.new_figure(6.0, 2.0, "")
+    ax = figure.subplots()
+    style.shade(ax, run, label=True)
+    style.time_axis([ax], run)
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    return ax, np.asarray(canvas.buffer_rgba())[..., :3].astype(int)
+
+
+def test_one_tick_of_hold_in_20_s_is_seen() -> None:
+    _, pixels = shaded(Log.from_bytes(Synthetic(duration=20.0, pushes=[], qp_failures=(500,)).log()).run())
+    assert (pixels[..., 0] - pixels[..., 1]).max() > 60  # red
+
+
+@pytest.mark.parametrize("start", [0.1, 3.0, 3.7])
+def test_a_pushs_words_stay_within_the_axes(start: float) -> None:
+    ax, _ = shaded(Log.from_bytes(Synthetic(pushes=[(start, 0.1, (0.0, -30.0, 0.0))]).log()).run())
+    words, frame = ax.texts[0].get_window_extent(), ax.get_window_extent()
+    assert ax.texts[0].get_text().startswith("push 3 N s")
+    assert frame.x0 < words.x0 and words.x1 < frame.x1
 
 
 def test_the_picture_draws_pushes_chosen_instants_and_views(stand: Run) -> None:
