@@ -145,7 +145,7 @@ class Friction:
     """of the controller's configuration"""
     planned_share_max: float | None
     """max(|fx|, |fy|) / (mu fz) of planned forces: 1 is the edge of the cone"""
-    measured_ratio_max: float | None
+    true_ratio_max: float | None
     """tangential over normal of the contacts' true forces"""
 
 
@@ -499,47 +499,48 @@ def num_joints(run: Run) -> int:
     return int(run.field("ROBOT_STATE", "num_joints").max()) if "ROBOT_STATE" in run else 0
 
 
-def planned_forces(run: Run) -> tuple[Floats, Floats, Array]:
-    """Stage 0 of every plan: (t [s] (n,), force [N] (n, contacts, 3) in W, planned contact (n, contacts) bool)."""
+def planned_forces(run: Run) -> tuple[Floats, Array]:
+    """Stage 0 of every plan: (force [N] (n, contacts, 3) in W, contact (n, contacts) bool). nan without a plan."""
     used = num_contacts(run)
-    force = run.field("FORCE_PLAN", "force")[:, 0, :used]
-    return run.time("FORCE_PLAN"), force, run.field("FORCE_PLAN", "contact")[:, 0, :used] != 0
+    planned = (run.field("FORCE_PLAN", "num_stages") > 0)[:, None]
+    force = np.where(planned[..., None], run.field("FORCE_PLAN", "force")[:, 0, :used], np.nan)
+    return force, planned & (run.field("FORCE_PLAN", "contact")[:, 0, :used] != 0)
 
 
-def planned_cone_share(run: Run, mu: float) -> Floats:
-    """Share of the friction pyramid used by stage 0 of every plan, (n, contacts); nan where there is no load.
+def cone_share(run: Run, channel: str, force: Array, mu: float | None) -> Floats:
+    """max(|fx|, |fy|) / (mu fz) of forces [N] (n, contacts, 3) in W of a channel's instants → (n, contacts).
 
-    The pyramid's sides are those of the force QP: along the reference's heading, not along W's axes.
+    Of the force QP's friction pyramid: its sides are along the reference's heading, not along W's axes; 1 is its edge.
+    nan where there is no load, or mu is not known.
     """
-    _, force, contact = planned_forces(run)
-    yaw = np.zeros(len(force))
+    yaw = np.zeros(1)
     if "CONTROLLER_TRACE" in run:
-        rows = match(run.field("FORCE_PLAN", "seq"), run.field("CONTROLLER_TRACE", "seq"))
-        yaw = np.where(rows >= 0, run.field("CONTROLLER_TRACE", "x_ref")[rows, 2], 0.0)
+        time = run.time("CONTROLLER_TRACE")
+        order = np.argsort(time, kind="stable")
+        heading = np.unwrap(run.field("CONTROLLER_TRACE", "x_ref")[order, 2])
+        yaw = np.interp(run.time(channel), time[order], heading)
     cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
-    along = cos * force[..., 0] + sin * force[..., 1]
-    across = cos * force[..., 1] - sin * force[..., 0]
-    heading_force = np.stack([along, across, force[..., 2]], axis=-1)
-    return np.asarray(np.where(contact, cone_share(heading_force, mu), np.nan))
+    along = np.abs(cos * force[..., 0] + sin * force[..., 1])
+    across = np.abs(cos * force[..., 1] - sin * force[..., 0])
+    return np.asarray(np.maximum(along, across) / ((mu or np.nan) * _loaded(force)))
 
 
-def cone_share(force: Array, mu: float) -> Floats:
-    """max(|fx|, |fy|) / (mu fz) of forces [N] (..., 3) → (...): 1 is the cone's edge; nan where there is no load."""
-    normal = np.where(force[..., 2] > MIN_NORMAL_FORCE, force[..., 2], np.nan)
-    return np.asarray(np.abs(force[..., :2]).max(axis=-1) / (mu * normal))
+def _loaded(force: Array) -> Floats:
+    """N, normal components of forces (..., 3) → (...); nan where they are too small to divide by."""
+    return np.asarray(np.where(force[..., 2] > MIN_NORMAL_FORCE, force[..., 2], np.nan))
 
 
 def friction_ratio(force: Array) -> Floats:
     """Tangential over normal of forces [N] (..., 3) → (...); nan where there is no load."""
-    normal = np.where(force[..., 2] > MIN_NORMAL_FORCE, force[..., 2], np.nan)
-    return np.asarray(np.hypot(force[..., 0], force[..., 1]) / normal)
+    return np.asarray(np.hypot(force[..., 0], force[..., 1]) / _loaded(force))
 
 
 def friction(run: Run) -> Friction:
     mu = configuration.friction(run)
     share = ratio = None
     if "FORCE_PLAN" in run and mu:
-        share = largest(planned_cone_share(run, mu))
+        force, contact = planned_forces(run)
+        share = largest(np.where(contact, cone_share(run, "FORCE_PLAN", force, mu), np.nan))
     if "TRUTH" in run:
         ratio = largest(friction_ratio(run.field("TRUTH", "f_F_W")[:, : num_contacts(run)]))
     return Friction(mu, share, ratio)

@@ -323,54 +323,52 @@ def forces(run: Run) -> Figure:
             axes[row, foot].tick_params(labelleft=False)
     below = [fig.add_subplot(grid[4, halves[0]]), fig.add_subplot(grid[rows - 1, halves[1]])]
     mu = configuration.friction(run)
-    names = configuration.foot_names(run, used)
-    for foot in range(used):
-        colour = style.FEET[foot]
-        column = axes[:, foot]
-        if "TRUTH" in run:
-            time, true = run.time("TRUTH"), run.field("TRUTH", "f_F_W")[:, foot]
-            for row in range(3):
-                column[row].plot(time, true[:, row], color=colour, lw=1.4, label="simulated")
-            if mu:
-                column[3].plot(time, metrics.friction_ratio(true) / mu, color=colour, lw=1.2, label="simulated")
-        if "FORCE_PLAN" in run:
-            time, planned, _ = metrics.planned_forces(run)
-            for row in range(3):
-                column[row].plot(
-                    time, planned[:, foot, row], color=style.PLANNED, lw=0.9, ls=(0, (4, 1.5)), label="commanded"
-                )
-            if mu:
-                share = metrics.planned_cone_share(run, mu)[:, foot]
-                column[3].plot(time, share, color=style.PLANNED, lw=0.9, ls=(0, (4, 1.5)), label="commanded")
+    # A plan is for the period that begins with its tick, the truth is the mean of the period that ended: steps, both.
+    if "FORCE_PLAN" in run:
+        time, (planned, contact) = run.time("FORCE_PLAN"), metrics.planned_forces(run)
+        share = metrics.cone_share(run, "FORCE_PLAN", planned, mu)
+        values = np.concatenate([planned, np.where(contact, share, np.nan)[..., None]], axis=-1)
+        for (row, foot), ax in np.ndenumerate(axes):
+            ax.step(time, values[:, foot, row], where="post", color=style.PLANNED, lw=2.6, label="planned")
+    if "TRUTH" in run:
+        time, true = run.time("TRUTH"), run.field("TRUTH", "f_F_W")[:, :used]
+        share = metrics.cone_share(run, "TRUTH", true, mu)
+        values = np.concatenate([true, share[..., None]], axis=-1)
+        for (row, foot), ax in np.ndenumerate(axes):
+            ax.step(time, values[:, foot, row], where="pre", color=style.FEET[foot], lw=0.9, label="true")
+    for row, least in enumerate((2.0, 2.0, 10.0)):
+        _at_least(axes[row, 0], least)
+    axes[3, 0].set_ylim(0.0, max(1.12, min(axes[3, 0].get_ylim()[1], 3.0)))
+    for foot, name in enumerate(configuration.foot_names(run, used)):
+        column = list(axes[:, foot])
+        column[0].set_title(f"{name.capitalize()} foot")
         column[3].axhline(1.0, color=style.BAD, lw=0.9)
-        column[3].set_ylim(0.0, 1.12)
-        column[0].set_title(f"{names[foot].capitalize()} foot")
-        shade(list(column), run, label=foot == 0)
-        time_axis(list(column), run)
+        shade(column, run, label=foot == 0)
+        time_axis(column, run)
         column[3].set_xlabel("")
         column[3].tick_params(labelbottom=False)
-    for row, label in enumerate(("$f_x$ [N]", "$f_y$ [N]", "$f_z$ [N]", f"share of the\ncone, µ = {mu or 0:g}")):
+    for row, label in enumerate(("$f_x$ [N]", "$f_y$ [N]", "$f_z$ [N]", f"share of the\npyramid, µ = {mu or 0:g}")):
         axes[row, 0].set_ylabel(label)
-    handles, labels = axes[0, -1].get_legend_handles_labels()
-    axes[0, -1].legend(handles, labels, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
-    _effort_and_error(below, run, used, names)
+    axes[0, -1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+    _effort_and_error(below, run, used)
     return fig
 
 
-def _effort_and_error(axes: list[Axes], run: Run, used: int, names: list[str]) -> None:
+def _effort_and_error(axes: list[Axes], run: Run, used: int) -> None:
     if "FORCE_PLAN" in run:
         axes[0].plot(run.time("FORCE_PLAN"), run.field("FORCE_PLAN", "effort"), color=style.SERIES[3])
         axes[0].set_ylim(0.0, None)
-    axes[0].set_title(r"Effort $\|f\|_R$")
-    axes[0].set_ylabel(r"[N $\sqrt{R}$]")
+    weight = configuration.value(run, "controller.stand.force_weight")
+    axes[0].set_title(r"Effort $\|f\|_R$" + (f", R = {weight:g} I, f in N" if isinstance(weight, float) else ""))
+    axes[0].set_ylabel(r"$(f^T R f)^{1/2}$")
     if "TRUTH" in run:
         error = np.linalg.norm(run.field("TRUTH", "force_error")[:, :used], axis=-1)
         error[run.field("TRUTH", "plan_seq") <= 0] = np.nan
-        for foot in range(used):
-            axes[1].plot(run.time("TRUTH"), error[:, foot], color=style.FEET[foot], lw=0.9, label=names[foot])
-        axes[1].legend(loc="upper right", ncols=used)
-        axes[1].set_ylim(0.0, None)
-    axes[1].set_title("Simulated less commanded force, norm")
+        for foot, name in enumerate(configuration.foot_names(run, used)):
+            axes[1].plot(run.time("TRUTH"), error[:, foot], color=style.FEET[foot], lw=0.9, label=name)
+        axes[1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=used)
+        axes[1].set_ylim(0.0, max(1.0, axes[1].get_ylim()[1]))
+    axes[1].set_title("True less planned force, norm")
     axes[1].set_ylabel("[N]")
     for ax in axes:
         shade(ax, run)

@@ -187,13 +187,13 @@ def _motion(metrics: Metrics) -> list[list[str]]:
         rows.append(["centre of mass from its reference, largest", f"{1000 * com.error_max:.1f} mm"])
         rows.append(["centre of mass from its reference, rms", f"{1000 * com.error_rms:.1f} mm"])
     if metrics.force_error is not None:
-        rows.append(["contact force less planned, rms", f"{metrics.force_error.rms:.2f} N"])
-        rows.append(["contact force less planned, largest", f"{metrics.force_error.max:.1f} N"])
+        rows.append(["true less planned force, rms", f"{metrics.force_error.rms:.2f} N"])
+        rows.append(["true less planned force, largest", f"{metrics.force_error.max:.1f} N"])
     friction = metrics.friction
     if friction.planned_share_max is not None:
         rows.append([f"friction cone used by the plan (µ = {friction.mu:g})", _percent(friction.planned_share_max)])
-    if friction.measured_ratio_max is not None:
-        rows.append(["tangential over normal force, true, largest", f"{friction.measured_ratio_max:.3f}"])
+    if friction.true_ratio_max is not None:
+        rows.append(["tangential over normal force, true, largest", f"{friction.true_ratio_max:.3f}"])
     if metrics.estimator is not None:
         error = metrics.estimator
         rows.append(["estimated position, error rms", f"{1000 * error.position_rms:.1f} mm"])

@@ -217,7 +217,7 @@ def test_a_residual_that_is_not_finite_is_infinite() -> None:
 
 def test_friction_uses_the_controllers_mu_and_only_loaded_contacts() -> None:
     plan, messages = ticked("force_plan_t", N), truth()
-    plan["num_contacts"], plan["contact"][:, 0, :2] = 2, 1
+    plan["num_contacts"], plan["num_stages"], plan["contact"][:, 0, :2] = 2, 1, 1
     plan["force"][:, 0, :2, 2] = 60.0
     plan["force"][30, 0, 0, :2] = 3.0, -16.5
     plan["force"][40, 0, 1] = 100.0, 0.0, 1.0  # hardly loaded
@@ -227,7 +227,29 @@ def test_friction_uses_the_controllers_mu_and_only_loaded_contacts() -> None:
     found = metrics.friction(run_of(base(FORCE_PLAN=plan, TRUTH=messages)))
     assert found.mu == 0.55
     assert found.planned_share_max == pytest.approx(16.5 / (0.55 * 60.0))
-    assert found.measured_ratio_max == pytest.approx(0.1)
+    assert found.true_ratio_max == pytest.approx(0.1)
+
+
+def test_planned_and_true_forces_are_measured_by_one_pyramid_along_the_heading() -> None:
+    plan, messages, decided = ticked("force_plan_t", N), truth(), trace()
+    plan["num_contacts"], plan["num_stages"], plan["contact"][:, 0, :2] = 2, 1, 1
+    decided["x_ref"][:, 2] = np.radians(179.0 + 0.04 * np.arange(N))
+    decided["x_ref"][decided["x_ref"][:, 2] > np.pi, 2] -= 2.0 * np.pi
+    force = 50.0 * np.array([0.2, -0.1, 1.0])
+    plan["force"][:, 0, :2], messages["f_F_W"][:, :2] = force, force
+    run = run_of(base(FORCE_PLAN=plan, TRUTH=messages, CONTROLLER_TRACE=decided))
+    planned, _ = metrics.planned_forces(run)
+    shares = metrics.cone_share(run, "FORCE_PLAN", planned, 0.5)
+    assert metrics.cone_share(run, "TRUTH", run.field("TRUTH", "f_F_W")[:, :2], 0.5) == pytest.approx(shares)
+    assert shares[25] == pytest.approx(0.4, abs=1e-6)  # at 180 degrees
+
+
+def test_without_stages_there_is_no_plan() -> None:
+    plan = ticked("force_plan_t", N)
+    plan["num_contacts"], plan["num_stages"] = 2, 1
+    plan["num_stages"][40:] = 0  # damped
+    force, contact = metrics.planned_forces(run_of(base(FORCE_PLAN=plan)))
+    assert np.isnan(force[40:]).all() and not np.isnan(force[:40]).any() and not contact[40:].any()
 
 
 def test_the_force_error_is_per_foot_and_only_where_there_is_a_plan() -> None:

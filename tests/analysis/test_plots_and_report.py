@@ -76,6 +76,21 @@ def test_a_plot_is_offered_where_the_log_can_give_it(stand: Run) -> None:
     assert set(plots.available(lonely())) == {"gait", "joints"}
 
 
+def test_a_planned_force_is_drawn_over_the_period_that_it_is_for_as_the_true_one_is(stand: Run) -> None:
+    axes = plots.forces(stand).axes
+    planned, true = axes[0].lines[:2]
+    assert (planned.get_label(), planned.get_drawstyle()) == ("planned", "steps-post")
+    assert (true.get_label(), true.get_drawstyle()) == ("true", "steps-pre")
+
+
+def test_a_calm_run_is_not_magnified() -> None:
+    messages = Synthetic(duration=0.5, pushes=[]).messages()
+    messages["TRUTH"]["f_F_W"][..., 1] = 1e-8 * np.sin(np.arange(51))[:, None]
+    messages["FORCE_PLAN"]["force"][..., 1] = 0.0
+    low, high = plots.forces(run_of(messages)).axes[2].get_ylim()  # fy of the left foot
+    assert high - low >= 2.0
+
+
 def test_the_same_run_gives_the_same_picture_byte_for_byte(stand: Run) -> None:
     for kind in ("png", "svg"):
         assert style.render(plots.gait(stand), kind, 40) == style.render(plots.gait(stand), kind, 40)
