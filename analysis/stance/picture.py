@@ -24,6 +24,8 @@ from .urdf import Robot, Shape, rotation_from_quaternion, transform
 FORCE_SCALE = 0.004  # m of arrow per N
 PUSH_SCALE = 0.008  # m of arrow per N, of the push
 PUSH_LENGTH = 0.30  # m, the longest arrow of a push
+BOTTOM, HEIGHT = -0.20, 1.05  # m, of a drawing
+MIN_STEP = 0.03  # s from a push's end to the largest tilt after it
 SIDE, FRONT = "side", "front"
 
 LINK_COLOUR = "#7d8b99"
@@ -87,6 +89,7 @@ def picture(run: Run, instants: Sequence[float] | None = None, view: str | None 
     if body is None:
         raise UnreadableError("no URDF in the log: the robot cannot be drawn")
     rows: list[tuple[str, Sequence[float], str]] = []
+    ghost = "pale: the first instant"
     if instants is not None:
         rows.append((view or SIDE, list(instants), ""))
     else:
@@ -94,39 +97,44 @@ def picture(run: Run, instants: Sequence[float] | None = None, view: str | None 
         for push in sorted(hardest, key=lambda push: push.start):
             seen = view or (FRONT if abs(push.impulse_W[1]) > abs(push.impulse_W[0]) else SIDE)
             rows.append((seen, _instants_of(run, push), style.push_text(push)))
-        if not rows:
+        if rows:
+            ghost = "pale: before the push"
+        else:
             rows.append((view or SIDE, np.linspace(*run.span, 5)[1:-1].tolist(), ""))
-    columns = max(len(times) for _, times, _ in rows)
+    poses = [[pose_at(run, time) for time in times] for _, times, _ in rows]
+    columns = max(map(len, poses))
+    top = max(HEIGHT, *(_top(body, pose) + 0.02 for row in poses for pose in row))
     fig = new_figure(
-        0.35 + 2.7 * columns, 0.85 + 3.15 * len(rows), "The robot and the ground's forces", configuration.title(run)
+        0.35 + 2.7 * columns,
+        0.85 + (0.65 + 2.0 * (top - BOTTOM)) * len(rows),
+        "The robot and the ground's forces",
+        configuration.title(run),
     )
     axes = fig.subplots(len(rows), columns, squeeze=False)
     mu = configuration.friction(run)
-    centre = np.mean([pose_at(run, times[0]).T_WB[:3, 3] for _, times, _ in rows], axis=0)
-    for row, (seen, times, label) in enumerate(rows):
-        first = pose_at(run, times[0])
-        for column in range(columns):
-            ax = axes[row, column]
-            if column >= len(times):
+    centre = np.mean([row[0].T_WB[:3, 3] for row in poses], axis=0)
+    for place, (seen, _, label) in enumerate(rows):
+        for column, ax in enumerate(axes[place]):
+            if column >= len(poses[place]):
                 ax.set_axis_off()
                 continue
-            pose = pose_at(run, times[column])
-            draw(ax, body, pose, seen, ghost=first if column else None, centre=centre, mu=mu)
+            pose = poses[place][column]
+            draw(ax, body, pose, seen, ghost=poses[place][0] if column else None, centre=centre, mu=mu, top=top)
             words = f"t = {pose.time:.2f} s   tilt {np.degrees(pose.tilt):.1f}°"
             ax.set_title(words, fontsize=9, fontweight="normal", loc="center")
         if label:
-            axes[row, 0].set_ylabel(f"{label}, seen from the {seen}", fontsize=9, color=style.PUSH_INK, labelpad=6)
-    _key(axes[-1, 0], mu)
+            axes[place, 0].set_ylabel(f"{label}, seen from the {seen}", fontsize=9, color=style.PUSH_INK, labelpad=6)
+    _key(axes[-1, 0], mu, ghost if columns > 1 else "")
     return fig
 
 
-def _key(ax: Axes, mu: float | None) -> None:
+def _key(ax: Axes, mu: float | None, ghost: str) -> None:
     """What the marks mean, below the first drawing."""
     left, y = ax.get_xlim()[0] + 0.02, -0.155
     _arrow(ax, np.array([left, y]), np.array([left + KEY_FORCE * FORCE_SCALE, y]), style.MUTED, 2.0, 14)
-    cone = f"   shaded: friction cone, µ = {mu:g}" if mu else ""
+    cone = f"shaded: friction cone, µ = {mu:g}" if mu else ""
     words = ax.annotate(
-        f"{KEY_FORCE:.0f} N of the ground   ○ centre of mass{cone}   pale: before the push",
+        "   ".join(filter(None, (f"{KEY_FORCE:.0f} N of the ground", "○ centre of mass", cone, ghost))),
         (left + KEY_FORCE * FORCE_SCALE + 0.03, y),
         va="center",
         fontsize=8,
@@ -137,17 +145,28 @@ def _key(ax: Axes, mu: float | None) -> None:
 
 
 def _instants_of(run: Run, push: Push) -> list[float]:
-    """Before a push, within it, at its end, at the largest deflection after it, and back again [s]."""
+    """Before a push, within it, at its end, at the largest tilt after it, and back again [s]; a fall ends them."""
     time = run.time("TRUTH")
-    position = run.field("TRUTH", "p_WB")
     end = push.start + push.duration
-    before = position[int(np.argmin(np.abs(time - (push.start - 0.02))))]
-    after = np.flatnonzero((time >= end) & (time <= end + 1.0))
-    peak = end
+    after = np.flatnonzero((time >= end + MIN_STEP) & (time <= end + 1.0))
+    wanted = [push.start - 0.02, push.start + 0.5 * push.duration, end]
     if len(after):
-        peak = float(time[after[np.argmax(np.linalg.norm(position[after] - before, axis=1))]])
-    peak = max(peak, end + 0.08)
-    return [push.start - 0.02, push.start + 0.5 * push.duration, end, peak, min(peak + 1.0, run.span[1])]
+        tilt = metrics.tilt(run.field("TRUTH", "quat_WB")[after])
+        peak = float(time[after[np.argmax(tilt)]])
+        wanted += [peak, min(peak + 1.0, float(time[-1]))]
+    return [one for before, one in zip([-np.inf, *wanted], wanted, strict=False) if one > before]
+
+
+def _top(body: Robot, pose: Pose) -> float:
+    """m, the highest point of the trunk over the ground."""
+    boxes = [shape for shape in body.links[body.root].visual if shape.kind == "box"]
+    return max((float(_corners(pose.T_WB @ shape.T_link, shape)[:, 2].max()) for shape in boxes), default=0.0)
+
+
+def _corners(T: Array, box: Shape) -> Array:
+    """m, (8, 3), of a box whose frame is T."""
+    corners = np.array(np.meshgrid(*[[-0.5 * size, 0.5 * size] for size in box.size])).reshape(3, -1)
+    return np.asarray((T[:3, :3] @ corners + T[:3, 3:]).T)
 
 
 def draw(
@@ -158,8 +177,12 @@ def draw(
     ghost: Pose | None = None,
     centre: Array | None = None,
     mu: float | None = None,
+    top: float = HEIGHT,
 ) -> None:
-    """Draws one pose on an axis in metres of W; `ghost` is another pose, faint behind it; `mu` that of the cones."""
+    """Draws one pose on an axis in metres of W, up to the height `top`.
+
+    `ghost` is another pose, faint behind it; `mu` that of the cones.
+    """
     plane = _plane(view)
     middle = (pose.T_WB[:3, 3] if centre is None else np.asarray(centre)) @ plane[0]
     ax.axhspan(-0.08, 0.0, color="#eceff2", lw=0, zorder=0)
@@ -198,7 +221,7 @@ def draw(
             zorder=20,
         )
     ax.set_xlim(middle - 0.50, middle + 0.50)
-    ax.set_ylim(-0.20, 1.05)
+    ax.set_ylim(BOTTOM, top)
     ax.set_aspect("equal")
     ax.set_xticks([])
     ax.set_yticks([])
@@ -247,8 +270,7 @@ def _link_colour(side: int | None, behind: bool) -> str:
 
 def _shape(ax: Axes, T: Array, shape: Shape, plane: Array, colour: str, alpha: float, order: int) -> None:
     if shape.kind == "box":
-        corners = np.array(np.meshgrid(*[[-0.5 * size, 0.5 * size] for size in shape.size])).reshape(3, -1)
-        points = (T[:3, :3] @ corners + T[:3, 3:]).T @ plane.T
+        points = _corners(T, shape) @ plane.T
         outline = points[ConvexHull(points).vertices]
         ax.add_patch(Polygon(outline, closed=True, fc=colour, ec=LINK_COLOUR, lw=1.2, alpha=alpha, zorder=order + 1))
     elif shape.kind == "cylinder":

@@ -12,6 +12,7 @@ import pytest
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.patches import Polygon
 from stance import plots, style
 from stance.errors import StanceError, UnreadableError
 from stance.log import Log
@@ -131,6 +132,30 @@ def test_a_pushs_words_stay_within_the_axes(start: float) -> None:
 def test_the_picture_draws_pushes_chosen_instants_and_views(stand: Run) -> None:
     assert len(picture(stand).axes) == 10  # two pushes, five instants each
     assert len(picture(stand, [0.5, 1.0, 2.0], "front").axes) == 3
+
+
+def test_the_picture_of_a_fall_is_in_order_whole_and_ends_with_it() -> None:
+    run = (
+        Log.from_bytes(Synthetic(duration=2.0, pushes=[(1.2, 0.1, (15.0, 0.0, 0.0))], fall_at=1.3).log())
+        .run()
+        .between(None, 1.9)
+    )
+    figure = picture(run)
+    shown = [float(ax.get_title().split()[2]) for ax in figure.axes if ax.get_title()]
+    tilts = [float(ax.get_title().split()[-1].rstrip("°")) for ax in figure.axes if ax.get_title()]
+    assert shown == sorted(set(shown))
+    assert tilts[-1] == max(tilts) > 80.0
+    for ax in figure.axes:
+        highest = max(patch.get_path().vertices[:, 1].max() for patch in ax.patches if isinstance(patch, Polygon))
+        assert highest < ax.get_ylim()[1]
+
+
+@pytest.mark.parametrize(
+    ("instants", "key"), [(None, "pale: before the push"), ([0.5, 1.0], "pale: the first instant"), ([0.5], None)]
+)
+def test_the_key_says_what_is_pale(stand: Run, instants: list[float] | None, key: str | None) -> None:
+    words = " ".join(text.get_text() for ax in picture(stand, instants).axes for text in ax.texts)
+    assert (key in words) if key else ("pale" not in words)
 
 
 def test_a_pose_is_the_logged_instant(stand: Run) -> None:
