@@ -19,6 +19,7 @@ from .errors import StanceError
 
 BOUNDS = ("max", "min", "equals")
 SHARE = "share"  # a unit: of 1, told as a percentage
+UNITS = {"us": " µs", "deg": "°"}  # for people
 KEYS = {"name", "metric", "unit", "optional", *BOUNDS}
 DIRECTORY = Path(__file__).parent / "limits"
 
@@ -49,12 +50,12 @@ class Finding:
     def rule(self) -> str:
         """The limit for people, as "≤ 10 deg"."""
         sign = {"max": "≤ ", "min": "≥ ", "equals": "= "}[self.limit.bound]
-        return sign + _text(self.limit.value, self.limit.unit)
+        return sign + quantity(self.limit.value, self.limit.unit)
 
     @property
     def measured(self) -> str:
         """The figure for people."""
-        return "not in the log" if self.value is None else _text(self.value, self.limit.unit)
+        return "not in the log" if self.value is None else quantity(self.value, self.limit.unit)
 
 
 @dataclass(frozen=True)
@@ -173,12 +174,15 @@ def load_limits(path: Path) -> list[Limit]:
     return parse_limits(text, path.name)
 
 
-def _text(value: Any, unit: str) -> str:
+def quantity(value: Any, unit: str) -> str:
+    """A figure for people, the same in the verdict, the card and the report: 3 digits, lengths below 0.1 m in mm."""
     if isinstance(value, bool):
         return "yes" if value else "no"
     if not isinstance(value, int | float):
         return str(value)
     if unit == SHARE:
         value, unit = 100.0 * value, "%"
+    elif unit in ("m", "m/s") and abs(value) < 0.1:
+        value, unit = 1000.0 * value, f"m{unit}"
     number = f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.3g}" if isinstance(value, float) else str(value)
-    return f"{number} {'µs' if unit == 'us' else unit}".rstrip()
+    return f"{number}{UNITS.get(unit, f' {unit}')}".rstrip()

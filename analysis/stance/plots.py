@@ -170,14 +170,14 @@ def timing(run: Run) -> Figure:
     positive = np.concatenate([values[values > 0] for _, values, _ in quantities])
     edges = np.geomspace(max(positive.min(), 1.0), positive.max() * 1.1, 70) if len(positive) else np.ones(2)
     bins = edges.tolist()
-    for _, values, colour in quantities:
-        ax.hist(values, bins, histtype="stepfilled", color=colour, alpha=0.25)
-        ax.hist(values, bins, histtype="step", color=colour, lw=1.0)
+    for name, values, colour in quantities:
+        ax.hist(values, bins, histtype="stepfilled", fc=(colour, 0.25), ec=colour, lw=1.0, label=name)
     ax.set_xscale("log")
     ax.set_yscale("log")
     ax.set_ylim(0.7, None)
     ax.axvline(deadline, color=style.BAD, lw=1.0, ls=(0, (4, 2)))
     ax.set_title("Histogram")
+    ax.legend(loc="lower left", bbox_to_anchor=(0.24, 1.0), ncols=2, fontsize=7.0, columnspacing=1.0)
     ax.set_xlabel("time [µs]")
     ax.set_ylabel("ticks")
 

@@ -13,7 +13,7 @@ import jinja2
 from matplotlib.figure import Figure
 
 from . import __version__, configuration, plots, style
-from .check import Verdict, judge, limits_file, load_limits
+from .check import SHARE, Verdict, judge, limits_file, load_limits, quantity
 from .errors import StanceError
 from .log import Log
 from .messages import CONTROLLER_CHANNELS
@@ -177,32 +177,28 @@ def tables(metrics: Metrics) -> list[Table]:
 
 
 def _motion(metrics: Metrics) -> list[list[str]]:
-    rows = [["duration", f"{metrics.duration:.2f} s"]]
+    rows: list[tuple[str, float | None, str]] = [("duration", metrics.duration, "s")]
     if metrics.trunk is not None:
-        rows.append(["trunk tilt, largest", f"{metrics.trunk.tilt_max_deg:.2f}°"])
-        rows.append(["trunk tilt, rms", f"{metrics.trunk.tilt_rms_deg:.2f}°"])
-        rows.append(["trunk height, least", f"{metrics.trunk.height_min:.3f} m"])
+        rows.append(("trunk tilt, largest", metrics.trunk.tilt_max_deg, "deg"))
+        rows.append(("trunk tilt, rms", metrics.trunk.tilt_rms_deg, "deg"))
+        rows.append(("trunk height, least", metrics.trunk.height_min, "m"))
     if metrics.center_of_mass is not None:
-        com = metrics.center_of_mass
-        rows.append(["centre of mass from its reference, largest", f"{1000 * com.error_max:.1f} mm"])
-        rows.append(["centre of mass from its reference, rms", f"{1000 * com.error_rms:.1f} mm"])
+        rows.append(("centre of mass from its reference, largest", metrics.center_of_mass.error_max, "m"))
+        rows.append(("centre of mass from its reference, rms", metrics.center_of_mass.error_rms, "m"))
     if metrics.force_error is not None:
-        rows.append(["true less planned force, rms", f"{metrics.force_error.rms:.2f} N"])
-        rows.append(["true less planned force, largest", f"{metrics.force_error.max:.1f} N"])
+        rows.append(("true less planned force, rms", metrics.force_error.rms, "N"))
+        rows.append(("true less planned force, largest", metrics.force_error.max, "N"))
     friction = metrics.friction
-    if friction.planned_share_max is not None:
-        rows.append([f"friction cone used by the plan (µ = {friction.mu:g})", _percent(friction.planned_share_max)])
-    if friction.true_ratio_max is not None:
-        rows.append(["tangential over normal force, true, largest", f"{friction.true_ratio_max:.3f}"])
+    if friction.mu is not None:
+        rows.append((f"friction cone used by the plan (µ = {friction.mu:g})", friction.planned_share_max, SHARE))
+    rows.append(("tangential over normal force, true, largest", friction.true_ratio_max, ""))
     if metrics.estimator is not None:
-        error = metrics.estimator
-        rows.append(["estimated position, error rms", f"{1000 * error.position_rms:.1f} mm"])
-        rows.append(["estimated position, drift", f"{1000 * error.position_drift:.1f} mm"])
-        rows.append(["estimated velocity, error rms", f"{1000 * error.velocity_rms:.1f} mm/s"])
-        rows.append(["estimated tilt, largest error", f"{error.tilt_max_deg:.3f}°"])
-    if metrics.drives_damped is not None:
-        rows.append(["drives damped", f"{metrics.drives_damped:.2f} s"])
-    return rows
+        rows.append(("estimated position, error rms", metrics.estimator.position_rms, "m"))
+        rows.append(("estimated position, drift", metrics.estimator.position_drift, "m"))
+        rows.append(("estimated velocity, error rms", metrics.estimator.velocity_rms, "m/s"))
+        rows.append(("estimated tilt, largest error", metrics.estimator.tilt_max_deg, "deg"))
+    rows.append(("drives damped", metrics.drives_damped, "s"))
+    return [[name, quantity(value, unit)] for name, value, unit in rows if value is not None]
 
 
 def _ticks(ticks: Ticks) -> list[list[str]]:
@@ -239,4 +235,4 @@ def _percentile_row(name: str, found: Percentiles | None) -> list[str]:
 
 
 def _percent(value: float | None) -> str:
-    return "no limit" if value is None else f"{100 * value:.1f} %"
+    return "no limit" if value is None else quantity(value, SHARE)

@@ -38,7 +38,7 @@ ESTIMATE = "#e07b1a"
 PLANNED = "#aeb9c4"
 FEET = ("#1769aa", "#c2185b", "#2e8b57", "#8e5bb5")
 JOINTS = ("#1769aa", "#e07b1a", "#2e8b57", "#8e5bb5", "#c2185b", "#6d4c41", "#00897b", "#7a8793")
-STAGES = ("#b8c4d0", "#8fa3b5", "#7fb4d9", "#4f94c4", "#2e8b57", "#1769aa", "#e07b1a", "#d9a441", "#8e5bb5", "#dfe4e8")
+STAGES = ("#b8c4d0", "#8fa3b5", "#7fb4d9", "#4f94c4", "#2e8b57", "#1769aa", "#e07b1a", "#d9a441", "#8e5bb5", "#a1887f")
 SERIES = ("#1769aa", "#e07b1a", "#2e8b57", "#8e5bb5")
 
 RC: dict[str, Any] = {

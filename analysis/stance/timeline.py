@@ -88,8 +88,8 @@ def _faults(run: Run) -> list[Event]:
                 merged.append((first, last))
         for first, last in merged:
             count = int(stood[first : last + 1].sum())
-            length = f"for {time[last] - time[first]:.2f} s" if last > first else "once"
-            text = f"{name.replace('_', ' ')}, {length} ({count} ticks)"
+            length = f"for {time[last] - time[first]:.2f} s ({count} ticks)" if count > 1 else "once"
+            text = f"{name.replace('_', ' ')}, {length}"
             found.append(Event(float(time[first]), "fault", text, bad=True))
     return found
 

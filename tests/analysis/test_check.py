@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
-from stance.check import DIRECTORY, Limit, judge, limits_file, load_limits, parse_limits
+from stance.check import DIRECTORY, Limit, judge, limits_file, load_limits, parse_limits, quantity
 from stance.errors import StanceError
 from stance.log import Log
 from stance.metrics import measure
@@ -75,6 +75,22 @@ def test_standing_keeps_the_limits_and_falling_or_standing_without_states_does_n
     fallen = Log.from_bytes(Synthetic(fall_at=2.0, qp_failures=(50,)).log())
     violated = judge(measure(fallen.run(), fallen.report).as_dict(), limits).violated
     assert {"fell", "largest trunk tilt", "failed QPs"} <= {finding.limit.name for finding in violated}
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "text"),
+    [
+        (26.49, "deg", "26.5°"),
+        (0.00867, "m", "8.67 mm"),
+        (0.812, "m", "0.812 m"),
+        (0.005, "share", "0.5 %"),
+        (4999.6, "us", "5,000 µs"),
+        (0, "", "0"),
+        (False, "", "no"),
+    ],
+)
+def test_a_figure_reads_the_same_everywhere(value: float, unit: str, text: str) -> None:
+    assert quantity(value, unit) == text
 
 
 def test_an_unknown_scenario_is_judged_by_the_default_list() -> None:

@@ -246,6 +246,12 @@ def test_an_unknown_plot_is_an_error_that_names_the_known(stand: Run, tmp_path: 
     assert "picture" in figures(analysis)
 
 
+def test_the_timeline_counts_the_ticks_of_a_fault() -> None:
+    run = Log.from_bytes(Synthetic(duration=1.0, pushes=[], qp_failures=(20, 50, 51, 52)).log()).run()
+    texts = [event.text for event in timeline(run) if event.kind == "fault"]
+    assert texts == ["qp failed, once", "qp failed, for 0.02 s (3 ticks)"]
+
+
 def test_the_timeline_tells_gaps_restarts_stops_and_commands_that_change() -> None:
     events = Synthetic(duration=2.0, pushes=[]).events()
     states = [i for i, event in enumerate(events) if event[1] == "ROBOT_STATE"]
