@@ -37,7 +37,7 @@ def examine() -> list[Finding]:
     found += [_examine(name, lambda name=name: str(find_lcm_tool(name))) for name in LCM_TOOLS]  # type: ignore[misc]
     found.append(_examine("message types", _message_types))
     found.append(_examine("network", _network))
-    found += [_priority(), _locked_memory(), _cores(), _preemption()]
+    found += [_java(), _priority(), _locked_memory(), _cores(), _preemption()]
     return found
 
 
@@ -73,6 +73,11 @@ def _capable(capability: int) -> bool:
         return False
     effective = next((int(line.split()[1], 16) for line in lines if line.startswith("CapEff")), 0)
     return bool(effective >> capability & 1)
+
+
+def _java() -> Finding:
+    java = shutil.which("java")
+    return Finding("java", java is not None, java or "lcm-spy needs it: apt-get install default-jre", needed=False)
 
 
 def _priority() -> Finding:

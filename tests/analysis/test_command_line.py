@@ -145,6 +145,15 @@ def test_doctor_has_a_line_for_each_thing(capsys: pytest.CaptureFixture[str]) ->
     assert all("\n" not in one["text"] for one in found.values())
 
 
+def test_doctor_notes_that_lcm_spy_needs_java(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", "/nowhere")
+    main(["doctor"])
+    line = next(line for line in capsys.readouterr().out.splitlines() if " java " in line)
+    assert line.startswith("note") and "lcm-spy needs it" in line
+
+
 @pytest.mark.parametrize("command", ["info", "check", "report", "plot", "replay"])
 def test_unreadable_input_is_exit_3_and_one_line(
     command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
