@@ -131,10 +131,13 @@ def _scenario_text(robot: str, scenario: str) -> dict[str, Any]:
     share = Path(os.environ.get("STANCE_SHARE", SOURCE_TREE))
     path = Path(scenario) if scenario.endswith(".yaml") else share / "sim/scenarios" / robot / f"{scenario}.yaml"
     try:
-        text = path.read_text()
+        loaded = yaml.safe_load(path.read_text())
     except OSError as error:
         raise StanceError(f"no scenario {path}: give a name below sim/scenarios/{robot}/ or a .yaml file") from error
-    loaded: dict[str, Any] = yaml.safe_load(text)
+    except yaml.YAMLError:
+        loaded = None
+    if not isinstance(loaded, dict):
+        raise StanceError(f"{path} is no scenario: it must be a YAML mapping")
     return loaded
 
 

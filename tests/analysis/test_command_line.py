@@ -12,6 +12,7 @@ import time
 from pathlib import Path
 
 import fake_programs
+import lcm
 import numpy as np
 import pandas as pd
 import pytest
@@ -19,6 +20,7 @@ from scipy.io import loadmat
 from stance import network, plots
 from stance.cli import main
 from stance.log import Log
+from stance.programs import find_lcm_tool
 from synthetic import WALL, Synthetic, encode_log
 
 
@@ -383,6 +385,26 @@ def test_ctrl_c_ends_every_process_and_leaves_a_readable_log_and_others_can_join
     assert not any(Path(f"/proc/{child}").exists() for child in children)
     assert Log.open(log).report.skipped == []
     assert stance.run("shell", "--", "true")[0] == 2
+
+
+@needs_network
+@pytest.mark.parametrize("player", ["stance replay", "lcm-logplayer"])
+def test_a_subscriber_hears_the_whole_log_byte_for_byte(player: str, stance: Stance, small: str) -> None:
+    command = [sys.executable, "-m", "stance", "replay", "--silent"]
+    if player == "lcm-logplayer":
+        command = [str(find_lcm_tool(player)), f"--lcm-url={network.LCM_URL}"]
+    prefix = [] if network.host_is_loopback() else network.namespace_command() or []
+    done = subprocess.run(
+        [*prefix, sys.executable, str(Path(__file__).with_name("heard.py")), *command, small],
+        env={**stance.environment, network.INSIDE: "1"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    heard = [(channel, bytes.fromhex(payload)) for channel, payload in json.loads(done.stdout)]
+    written = [(event.channel, event.data) for event in lcm.EventLog(small)]
+    assert [one for one in heard if one[0] != "LCM_SELF_TEST"] == [one for one in written if one[0] != "LCM_SELF_TEST"]
 
 
 @needs_network
