@@ -59,13 +59,13 @@ SensorNoise noise_from(StrictYaml yaml) {
   return noise;
 }
 
-SensorModel sensors_from(StrictYaml yaml, bool noise_is_word) {
+SensorModel sensors_from(StrictYaml yaml) {
   SensorModel sensors;
   sensors.delay_steps = whole_steps(yaml, "delay", kPhysicsStep, kMaxSensorDelaySteps);
   sensors.accelerometer_limit = number_in(yaml, "accelerometer_limit", kGravity, 1e6);
   sensors.contact_threshold = number_in(yaml, "contact_threshold", 0.0, 1e6);
   sensors.contact_delay_steps = whole_steps(yaml, "contact_delay", kPhysicsStep, kMaxSensorDelaySteps);
-  if (!noise_is_word) {
+  if (!yaml.is_scalar("noise")) {
     sensors.noise = noise_from(yaml.mapping("noise"));
   } else if (yaml.text("noise") != "none") {
     yaml.fail("noise", "is '" + yaml.text("noise") + "', but must be none or a mapping");
@@ -140,8 +140,7 @@ Scenario scenario_from_text(const std::string& text, const std::string& name) {
   scenario.leg_mass_factor = number_in(factors, "legs", 0.1, 10.0);
   factors.finish();
   scenario.initial = initial_from(yaml.mapping("initial_state"));
-  const YAML::Node noise = YAML::Load(text)["sensors"]["noise"];
-  scenario.sensors = sensors_from(yaml.mapping("sensors"), noise && noise.IsScalar());
+  scenario.sensors = sensors_from(yaml.mapping("sensors"));
   for (StrictYaml& push : yaml.mappings("pushes")) scenario.pushes.push_back(push_from(push));
   for (StrictYaml& command : yaml.mappings("commands")) scenario.commands.push_back(command_from(command));
   yaml.finish();

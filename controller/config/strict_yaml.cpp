@@ -61,7 +61,10 @@ std::string StrictYaml::entry_path(const std::string& key, std::size_t index) co
   return path_ + key + "[" + std::to_string(index + 1) + "].";
 }
 
-bool StrictYaml::has(const std::string& key) const { return static_cast<bool>(node_[key]); }
+bool StrictYaml::is_scalar(const std::string& key) const {
+  const YAML::Node value = node_[key];
+  return value && value.IsScalar();
+}
 
 YAML::Node StrictYaml::require(const std::string& key) {
   read_.push_back(key);
@@ -71,19 +74,10 @@ YAML::Node StrictYaml::require(const std::string& key) {
 }
 
 double StrictYaml::number(const std::string& key) { return finite(*this, key, require(key)); }
-double StrictYaml::number(const std::string& key, double fallback) { return has(key) ? number(key) : fallback; }
-
 int StrictYaml::integer(const std::string& key) { return convert<int>(*this, key, require(key), "a whole number"); }
-int StrictYaml::integer(const std::string& key, int fallback) { return has(key) ? integer(key) : fallback; }
-
-bool StrictYaml::boolean(const std::string& key) { return convert<bool>(*this, key, require(key), "true or false"); }
-bool StrictYaml::boolean(const std::string& key, bool fallback) { return has(key) ? boolean(key) : fallback; }
 
 std::string StrictYaml::text(const std::string& key) {
   return convert<std::string>(*this, key, require(key), "a text");
-}
-std::string StrictYaml::text(const std::string& key, const std::string& fallback) {
-  return has(key) ? text(key) : fallback;
 }
 
 std::vector<double> StrictYaml::numbers(const std::string& key, int size) {
@@ -113,7 +107,7 @@ StrictYaml StrictYaml::mapping(const std::string& key) {
 
 std::vector<StrictYaml> StrictYaml::mappings(const std::string& key) {
   std::vector<StrictYaml> entries;
-  if (!has(key)) return entries;
+  if (!node_[key]) return entries;
   const YAML::Node list = require(key);
   if (!list.IsSequence()) fail(key, "must be a list");
   for (std::size_t i = 0; i < list.size(); ++i) {

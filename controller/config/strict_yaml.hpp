@@ -14,24 +14,20 @@ class ConfigError : public std::invalid_argument {
   using std::invalid_argument::invalid_argument;
 };
 
-/// One mapping of a YAML document. Keys are required unless read with `optional`; `finish()` refuses the keys that
-/// nobody read.
+/// One mapping of a YAML document. Every key that is read is required, but for a list of mappings; `finish()` refuses
+/// the keys that nobody read.
 class StrictYaml {
  public:
   /// Parses `text`; `name` stands in messages (a file's name). Throws ConfigError where it is no YAML mapping, or a key
   /// stands twice in one mapping.
   static StrictYaml parse(const std::string& text, const std::string& name);
 
-  bool has(const std::string& key) const;
+  /// Does a number or a word stand there, and neither nothing nor a list nor a mapping?
+  bool is_scalar(const std::string& key) const;
 
   double number(const std::string& key);
-  double number(const std::string& key, double fallback);
   int integer(const std::string& key);
-  int integer(const std::string& key, int fallback);
-  bool boolean(const std::string& key);
-  bool boolean(const std::string& key, bool fallback);
   std::string text(const std::string& key);
-  std::string text(const std::string& key, const std::string& fallback);
   /// A list of numbers, exactly `size` of them where size > 0.
   std::vector<double> numbers(const std::string& key, int size = 0);
   std::vector<std::string> texts(const std::string& key);

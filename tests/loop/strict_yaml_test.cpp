@@ -28,11 +28,10 @@ void check_refused(const std::string& text, const std::function<void(StrictYaml&
 
 TEST_CASE("EveryKindOfValueIsRead") {
   StrictYaml root = yaml(
-      "number: -1.5e-3\nwhole: 7\nyes_or_no: true\nword: osqp\nlist: [1, 2.5, 3]\nnames: [a, b]\n"
+      "number: -1.5e-3\nwhole: 7\nword: osqp\nlist: [1, 2.5, 3]\nnames: [a, b]\n"
       "below: {deep: {number: 4}}\nentries: [{x: 1}, {x: 2}]\nanothers: {x: 9}\n");
   CHECK(root.number("number") == -1.5e-3);
   CHECK(root.integer("whole") == 7);
-  CHECK(root.boolean("yes_or_no"));
   CHECK(root.text("word") == "osqp");
   CHECK(root.numbers("list", 3) == std::vector<double>{1.0, 2.5, 3.0});
   CHECK(root.numbers("list").size() == 3);
@@ -48,19 +47,11 @@ TEST_CASE("EveryKindOfValueIsRead") {
   CHECK_NOTHROW(root.finish());
 }
 
-TEST_CASE("AFallbackStandsForAMissingKeyOnly") {
-  StrictYaml root = yaml("number: 1\nwhole: 2\nyes_or_no: false\nword: here\n");
-  CHECK(root.number("number", 9.0) == 1.0);
-  CHECK(root.integer("whole", 9) == 2);
-  CHECK_FALSE(root.boolean("yes_or_no", true));
-  CHECK(root.text("word", "there") == "here");
-  CHECK(root.number("a", 9.0) == 9.0);
-  CHECK(root.integer("b", 9) == 9);
-  CHECK(root.boolean("c", true));
-  CHECK(root.text("d", "there") == "there");
-  root.finish();
-  check_refused(
-      "number: abc", [](StrictYaml& y) { y.number("number", 9.0); }, "number is 'abc', but must be a number");
+TEST_CASE("AScalarIsANumberOrAWordThatStandsThere") {
+  const StrictYaml root = yaml("number: 1\nword: none\nnothing:\nlist: [1]\nbelow: {a: 1}\n");
+  CHECK(root.is_scalar("number"));
+  CHECK(root.is_scalar("word"));
+  for (const char* key : {"nothing", "list", "below", "missing"}) CHECK_FALSE(root.is_scalar(key));
 }
 
 TEST_CASE("AnUnknownKeyIsRefusedByItsFullPath") {
@@ -115,8 +106,6 @@ TEST_CASE("AValueOfAnotherTypeIsRefusedWithWhatItMustBe") {
       "1.5", [](StrictYaml& y) { y.integer("k"); }, "is '1.5', but must be a whole number");
   refused(
       "99999999999", [](StrictYaml& y) { y.integer("k"); }, "is '99999999999', but must be a whole number");
-  refused(
-      "2", [](StrictYaml& y) { y.boolean("k"); }, "is '2', but must be true or false");
   refused(
       "{a: 1}", [](StrictYaml& y) { y.text("k"); }, "is a list or a mapping, but must be a text");
   refused(

@@ -7,16 +7,18 @@
 namespace stance::sim {
 namespace {
 
-std::string demo_text() { return config::read_text(config::share_directory() / "sim/scenarios/biped/demo.yaml"); }
+std::string text_of(const std::string& scenario) {
+  return config::read_text(config::share_directory() / "sim/scenarios/biped" / (scenario + ".yaml"));
+}
 
-/// The message of the error that `text` with `from` replaced by `to` makes; empty where it makes none.
-std::string error_of(const std::string& from, const std::string& to) {
-  std::string text = demo_text();
+/// The message of the error that `scenario` with `from` replaced by `to` makes; empty where it makes none.
+std::string error_of(const std::string& from, const std::string& to, const std::string& scenario = "demo") {
+  std::string text = text_of(scenario);
   const auto at = text.find(from);
   REQUIRE(at != std::string::npos);
   text.replace(at, from.size(), to);
   try {
-    static_cast<void>(scenario_from_text(text, "demo.yaml"));
+    static_cast<void>(scenario_from_text(text, scenario + ".yaml"));
   } catch (const config::ConfigError& error) {
     return error.what();
   }
@@ -72,17 +74,21 @@ TEST_CASE("ScenarioErrorsNameTheKey") {
   CHECK(names(error_of("foot_clearance: -0.0003", "foot_clearance: -1"), "initial_state.foot_clearance"));
 }
 
-TEST_CASE("AWordForNoiseMustBeNone") {
-  std::string text = config::read_text(config::share_directory() / "sim/scenarios/biped/stand.yaml");
-  const auto at = text.find("noise: none");
-  REQUIRE(at != std::string::npos);
-  text.replace(at, 11, "noise: some");
-  try {
-    static_cast<void>(scenario_from_text(text, "quiet.yaml"));
-    FAIL("took it");
-  } catch (const config::ConfigError& error) {
-    CHECK(std::string(error.what()).find("sensors.noise is 'some'") != std::string::npos);
-  }
+TEST_CASE("NoiseIsNoneOrAMapping") {
+  CHECK(error_of("noise: none", "noise: some", "stand") ==
+        "stand.yaml: sensors.noise is 'some', but must be none or a mapping");
+  CHECK(error_of("noise: none", "noise: [none]", "stand") ==
+        "stand.yaml: sensors.noise must be a mapping of keys to values");
+  CHECK(error_of("noise: none", "noise:", "stand") == "stand.yaml: sensors.noise is missing");
+}
+
+TEST_CASE("ASectionThatIsNoMappingIsRefusedByItsKey") {
+  const std::string text = text_of("demo");
+  const auto from = text.find("sensors:"), to = text.find("pushes:");
+  REQUIRE(from < to);
+  CHECK(error_of(text.substr(from, to - from), "sensors: 3\n") ==
+        "demo.yaml: sensors must be a mapping of keys to values");
+  CHECK(error_of(text.substr(from, to - from), "") == "demo.yaml: sensors is missing");
 }
 
 TEST_CASE("AnUnknownScenarioAndAnotherRobotsAreErrors") {
