@@ -97,7 +97,7 @@ Simulator::Simulator(const config::RobotDescription& robot, const Scenario& scen
   WorldSetup setup;
   setup.model = robot_.model;
   setup.feet = robot_.feet;
-  setup.shapes = collision_shapes_from_urdf(robot_.urdf_text, robot_.model);
+  setup.shapes = rigid_body::collision_shapes_from_urdf(robot_.urdf_text, robot_.model);
   setup.friction = scenario_.friction;
   setup.floating = num_contacts_ > 0;
   setup.initial = initial_state(robot_, scenario_.initial);

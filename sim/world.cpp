@@ -37,13 +37,13 @@ PrincipalAxes principal_axes(const Body& body) {
   return {axes, solver.eigenvalues()};
 }
 
-std::unique_ptr<btCollisionShape> make_shape(const CollisionShape& shape) {
+std::unique_ptr<btCollisionShape> make_shape(const rigid_body::CollisionShape& shape) {
   switch (shape.kind) {
-    case ShapeKind::kBox:
+    case rigid_body::ShapeKind::kBox:
       return std::make_unique<btBoxShape>(to_bullet(0.5 * shape.size));
-    case ShapeKind::kCylinder:
+    case rigid_body::ShapeKind::kCylinder:
       return std::make_unique<btCylinderShapeZ>(btVector3(shape.size.x(), shape.size.x(), 0.5 * shape.size.y()));
-    case ShapeKind::kSphere:
+    case rigid_body::ShapeKind::kSphere:
       break;
   }
   return std::make_unique<btSphereShape>(shape.size.x());
@@ -119,7 +119,7 @@ World::World(const WorldSetup& setup) : model_(setup.model), feet_(setup.feet), 
   for (int i = 0; i < model_.num_bodies(); ++i) {
     const Matrix3 R_IL = axes[static_cast<std::size_t>(i)].R_LI.transpose();
     auto compound = std::make_unique<btCompoundShape>();
-    for (const CollisionShape& shape : setup.shapes) {
+    for (const rigid_body::CollisionShape& shape : setup.shapes) {
       if (shape.body != i) continue;
       bullet_->shapes.push_back(make_shape(shape));
       const Vector3 p_IS = R_IL * (shape.p_LS - model_.bodies[static_cast<std::size_t>(i)].com);

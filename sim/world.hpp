@@ -9,7 +9,6 @@
 
 #include "controller/rigid_body/dynamics.hpp"
 #include "controller/rigid_body/model.hpp"
-#include "sim/shapes.hpp"
 
 namespace stance::sim {
 
@@ -40,7 +39,7 @@ ContactVectors foot_tips(const rigid_body::Model& model, const std::vector<rigid
 struct WorldSetup {
   rigid_body::Model model;
   std::vector<rigid_body::Foot> feet;  ///< at most kMaxContacts
-  std::vector<CollisionShape> shapes;
+  std::vector<rigid_body::CollisionShape> shapes;
   double friction = 0.0;  ///< between the ground and the robot
   bool floating = true;   ///< false: the base is fixed where it starts
   rigid_body::State initial;

@@ -127,6 +127,31 @@ Joint read_joint(const urdf::Joint& from) {
   return joint;
 }
 
+/// `at`: the pose of the link in the body that carries it.
+CollisionShape read_shape(const urdf::Link& link, const urdf::Collision& collision, int body,
+                          const RigidTransform& at) {
+  CollisionShape shape;
+  shape.body = body;
+  const urdf::Geometry* geometry = collision.geometry.get();
+  if (const auto* box = dynamic_cast<const urdf::Box*>(geometry)) {
+    shape.kind = ShapeKind::kBox;
+    shape.size = {box->dim.x, box->dim.y, box->dim.z};
+  } else if (const auto* sphere = dynamic_cast<const urdf::Sphere*>(geometry)) {
+    shape.kind = ShapeKind::kSphere;
+    shape.size.x() = sphere->radius;
+  } else if (const auto* cylinder = dynamic_cast<const urdf::Cylinder*>(geometry)) {
+    shape.kind = ShapeKind::kCylinder;
+    shape.size = {cylinder->radius, cylinder->length, 0.0};
+  } else {
+    fail(quoted("link", link.name), "has a collision shape of another kind",
+         "make it a <box>, a <sphere> or a <cylinder>");
+  }
+  const RigidTransform T = at * transform(collision.origin);
+  shape.R_LS = T.R;
+  shape.p_LS = T.p;
+  return shape;
+}
+
 int index_or_minus_one(const Model& model, const std::string& link) {
   for (int b = 0; b < model.num_bodies(); ++b) {
     if (model.bodies[b].name == link) return b;
@@ -220,6 +245,20 @@ std::vector<Foot> feet_from_urdf(const std::string& urdf_text, const Model& mode
                     std::static_pointer_cast<urdf::Sphere>((*sphere)->geometry)->radius});
   }
   return feet;
+}
+
+std::vector<CollisionShape> collision_shapes_from_urdf(const std::string& urdf_text, const Model& model) {
+  const urdf::ModelInterfaceSharedPtr robot = parse(urdf_text);
+  std::vector<CollisionShape> shapes;
+  for (const auto& [name, link] : robot->links_) {
+    const Carrier carrier = carrier_of(*link);
+    const int body = model.body_index(carrier.link->name);
+    for (const auto& collision : link->collision_array) {
+      shapes.push_back(read_shape(*link, *collision, body, carrier.T));
+    }
+  }
+  std::stable_sort(shapes.begin(), shapes.end(), [](const auto& a, const auto& b) { return a.body < b.body; });
+  return shapes;
 }
 
 }  // namespace stance::rigid_body

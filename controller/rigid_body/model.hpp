@@ -39,6 +39,17 @@ struct Foot {
   double radius = 0.0;            ///< m
 };
 
+enum class ShapeKind { kBox, kSphere, kCylinder };
+
+/// What of a body can touch.
+struct CollisionShape {
+  int body = 0;  ///< body index
+  ShapeKind kind = ShapeKind::kSphere;
+  Vector3 size = Vector3::Zero();      ///< m; box: edges; sphere: (radius, -, -); cylinder along z: (radius, length, -)
+  Matrix3 R_LS = Matrix3::Identity();  ///< shape's axes in the body's link frame
+  Vector3 p_LS = Vector3::Zero();      ///< m, shape's centre in the body's link frame
+};
+
 struct Model {
   std::string name;
   int num_joints = 0;
@@ -62,5 +73,9 @@ Model model_from_urdf(const std::string& urdf_text, const std::vector<std::strin
 /// std::invalid_argument where a link is unknown or has no sphere collision shape.
 std::vector<Foot> feet_from_urdf(const std::string& urdf_text, const Model& model,
                                  const std::vector<std::string>& links);
+
+/// Every collision shape, in the order of the bodies that carry them. Throws std::invalid_argument naming the link for
+/// a shape other than box, sphere and cylinder.
+std::vector<CollisionShape> collision_shapes_from_urdf(const std::string& urdf_text, const Model& model);
 
 }  // namespace stance::rigid_body

@@ -15,6 +15,7 @@ using namespace stance::test;
 using Catch::Matchers::ContainsSubstring;
 using Catch::Matchers::MessageMatches;
 using rigid_body::Model;
+using rigid_body::ShapeKind;
 
 namespace {
 
@@ -117,6 +118,41 @@ TEST_CASE("FixedJointsMergeIntoTheirParents") {
   const auto feet = rigid_body::feet_from_urdf(fixed, model, {"hand"});
   CHECK(feet[0].body == 1);
   CHECK(max_difference(feet[0].tip, Vector3(0.0, 0.7, 0.0)) < kExact);
+}
+
+TEST_CASE("CollisionShapesStandInTheirBodiesOrderAndFrame") {
+  const std::string shapes =
+      robot_xml(link_xml("base", kInertial + R"(<collision><geometry><sphere radius="0.3"/></geometry></collision>)") +
+                link_xml("arm", kInertial + R"(<collision><geometry><box size="1 2 3"/></geometry></collision>)") +
+                link_xml("a_hand", R"(<collision><origin xyz="0 0 0.3" rpy="0 0 1.5707963267948966"/>
+                            <geometry><cylinder radius="0.1" length="0.4"/></geometry></collision>)") +
+                joint_xml("shoulder", "base", "arm") +
+                joint_xml("grip", "arm", "a_hand", R"(<origin xyz="0 1 0" rpy="1.5707963267948966 0 0"/>)", "fixed"));
+  const Model model = rigid_body::model_from_urdf(shapes, {"shoulder"});
+  const auto read = rigid_body::collision_shapes_from_urdf(shapes, model);
+  REQUIRE(read.size() == 3);
+  CHECK(read[0].body == 0);
+  CHECK(read[0].kind == ShapeKind::kSphere);
+  CHECK(read[0].size.x() == 0.3);
+  // The links of a body in the order of their names.
+  CHECK(read[1].body == 1);
+  CHECK(read[1].kind == ShapeKind::kCylinder);
+  CHECK(read[1].size == Vector3(0.1, 0.4, 0.0));
+  CHECK(max_difference(read[1].p_LS, Vector3(0.0, 0.7, 0.0)) < kExact);
+  const double quarter = 0.5 * std::numbers::pi;
+  CHECK(max_difference(read[1].R_LS, math::exp_so3({quarter, 0.0, 0.0}) * math::exp_so3({0.0, 0.0, quarter})) < kExact);
+  CHECK(read[2].body == 1);
+  CHECK(read[2].kind == ShapeKind::kBox);
+  CHECK(read[2].size == Vector3(1.0, 2.0, 3.0));
+  CHECK(read[2].p_LS == Vector3::Zero());
+}
+
+TEST_CASE("CollisionShapesOfAnotherKindAreRefusedByTheirLink") {
+  const std::string urdf = robot_xml(
+      link_xml("base", kInertial + R"(<collision><geometry><mesh filename="hand.stl"/></geometry></collision>)"));
+  const Model model = rigid_body::model_from_urdf(urdf, {});
+  CHECK_THROWS_MATCHES(rigid_body::collision_shapes_from_urdf(urdf, model), std::invalid_argument,
+                       MessageMatches(ContainsSubstring("link 'base'") && ContainsSubstring("<box>")));
 }
 
 TEST_CASE("InertiaIsTurnedIntoTheLinkFrame") {

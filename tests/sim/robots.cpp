@@ -12,7 +12,7 @@ WorldSetup biped_world(double height) {
   WorldSetup setup;
   setup.model = robot.model;
   setup.feet = robot.feet;
-  setup.shapes = collision_shapes_from_urdf(robot.urdf_text, robot.model);
+  setup.shapes = rigid_body::collision_shapes_from_urdf(robot.urdf_text, robot.model);
   setup.friction = 0.7;
   setup.initial.q = robot.nominal_joint_position;
   setup.initial.p_WB.z() = height;
