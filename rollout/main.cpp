@@ -1,5 +1,6 @@
 // stance-rollout: simulator and controller in one process, without sockets, as fast as the machine allows. The same
-// messages, in the same order, as over LCM in lockstep: the same results, bit for bit.
+// messages, in the same order, as over LCM in lockstep: the same results, bit for bit. Its log lacks what the wall
+// clock says there: CONTROLLER_TIMING, and the run's information each second.
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <chrono>
@@ -9,36 +10,18 @@
 #include <vector>
 
 #include "controller/compose.hpp"
+#include "controller/io/lcm_bytes.hpp"
 #include "controller/io/log.hpp"
 #include "controller/io/run_info.hpp"
 #include "controller/loop/wall_clock.hpp"
 #include "controller/platform/hash.hpp"
 #include "controller/platform/program.hpp"
+#include "sim/node.hpp"
 #include "sim/simulator.hpp"
 
 namespace {
 
 using namespace stance;
-
-template <typename Lcm>
-class Encoded {
- public:
-  io::Bytes operator()(const Lcm& message) {
-    bytes_.resize(static_cast<std::size_t>(message.getEncodedSize()));
-    message.encode(bytes_.data(), 0, static_cast<int>(bytes_.size()));
-    return bytes_;
-  }
-
- private:
-  std::vector<std::uint8_t> bytes_;
-};
-
-template <typename Lcm>
-Lcm decoded(io::Bytes bytes) {
-  Lcm message;
-  message.decode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return message;
-}
 
 /// What a rollout tells on stdout.
 struct Summary {
@@ -110,13 +93,16 @@ int main(int argc, char** argv) {
     const auto record = [&](const char* channel, io::Bytes bytes) {
       if (log) log->write(simulator.state().utime, channel, bytes);
     };
-    record(
-        io::channel::kRunInfo,
-        io::encode(io::RunInfo{robot.name, platform::command_line(argc, argv), robot.urdf_text, robot.yaml_text}));
+    std::vector<std::uint8_t> state, user_command, truth;
+    const auto record_truth = [&] {
+      if (!log) return;
+      io::encode(simulator.truth(), truth);
+      record("TRUTH", truth);
+    };
+    const std::string command_line = platform::command_line(argc, argv);
+    record("RUN_INFO_SIMULATOR", sim::encode_run_info(robot, scenario, options, command_line));
+    record(io::channel::kRunInfo, io::encode(io::RunInfo{robot.name, command_line, robot.urdf_text, robot.yaml_text}));
 
-    Encoded<stance_msgs::robot_state_t> state;
-    Encoded<stance_msgs::user_command_t> user_command;
-    Encoded<stance_msgs::truth_t> truth;
     loop::NoClock clock;
     Summary summary;
     const auto periods =
@@ -124,27 +110,28 @@ int main(int argc, char** argv) {
     const auto start = std::chrono::steady_clock::now();
     for (std::int64_t k = 0; k < periods && !simulator.fallen(); ++k) {
       if (const auto* command = simulator.user_command()) {
-        const io::Bytes bytes = user_command(*command);
-        record(io::channel::kUserCommand, bytes);
-        static_cast<void>(ticker.offer_user_command(bytes));
+        io::encode(*command, user_command);
+        record(io::channel::kUserCommand, user_command);
+        static_cast<void>(ticker.offer_user_command(user_command));
       }
-      const io::Bytes bytes = state(simulator.state());
-      record(io::channel::kRobotState, bytes);
-      static_cast<void>(ticker.offer_state(bytes));
+      io::encode(simulator.state(), state);
+      record(io::channel::kRobotState, state);
+      record_truth();
+      static_cast<void>(ticker.offer_state(state));
       ticker.tick(1, clock);
       record(io::channel::kForcePlan, ticker.plan().bytes());
       record(io::channel::kJointCommand, ticker.command().bytes());
       record(io::channel::kTrace, ticker.trace().bytes());
-      simulator.accept(decoded<stance_msgs::force_plan_t>(ticker.plan().bytes()));
-      simulator.accept(decoded<stance_msgs::joint_command_t>(ticker.command().bytes()));
+      simulator.accept(io::decoded<stance_msgs::force_plan_t>(ticker.plan().bytes()));
+      simulator.accept(io::decoded<stance_msgs::joint_command_t>(ticker.command().bytes()));
       simulator.advance();
-      if (log) record("TRUTH", truth(simulator.truth()));
 
       const auto& q = simulator.truth().quat_WB;
       summary.max_tilt =
           std::max(summary.max_tilt, std::acos(std::clamp(1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]), -1.0, 1.0)));
       summary.command_hash = platform::hash(ticker.command().bytes(), summary.command_hash);
     }
+    record_truth();
     summary.wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
     summary.duration = simulator.time();
     summary.fallen = simulator.fallen();

@@ -9,12 +9,15 @@
 #include <string_view>
 #include <utility>
 
+#include "controller/io/lcm_bytes.hpp"
 #include "controller/platform/hash.hpp"
 #include "controller/platform/real_time.hpp"
 #include "stance_commit.hpp"
 
 namespace stance::sim {
 namespace {
+
+using io::encode;
 
 constexpr std::int64_t kSecondNs = 1'000'000'000;
 constexpr auto kPeriodNs = static_cast<std::int64_t>(kControlPeriod * 1e9);
@@ -24,12 +27,6 @@ const std::string kRobotState = "ROBOT_STATE";
 const std::string kTruth = "TRUTH";
 const std::string kUserCommand = "USER_COMMAND";
 const std::string kRunInfo = "RUN_INFO_SIMULATOR";
-
-template <typename Message>
-void encode(const Message& message, std::vector<std::uint8_t>& bytes) {
-  bytes.resize(static_cast<std::size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-}
 
 /// FNV-1a, 64 bit, of the texts one after the other, in hexadecimal.
 std::string hash_of(std::initializer_list<std::string_view> texts) {
@@ -67,9 +64,7 @@ std::vector<std::uint8_t> encode_run_info(const config::RobotDescription& robot,
   info.configuration = robot.yaml_text;
   info.scenario = scenario.text;
   info.input_hash = hash_of({robot.urdf_text, robot.yaml_text, scenario.text});
-  std::vector<std::uint8_t> bytes;
-  encode(info, bytes);
-  return bytes;
+  return io::bytes_of(info);
 }
 
 Node::Node(lcm::LCM& lcm, Simulator& simulator, std::vector<std::uint8_t> run_info)

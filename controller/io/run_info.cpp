@@ -4,6 +4,7 @@
 #include <stance_msgs/run_info_t.hpp>
 #include <stdexcept>
 
+#include "controller/io/lcm_bytes.hpp"
 #include "controller/platform/hash.hpp"
 #include "stance_commit.hpp"
 
@@ -23,9 +24,7 @@ std::vector<std::uint8_t> encode(const RunInfo& info) {
   std::snprintf(text, sizeof text, "%016llx",
                 static_cast<unsigned long long>(platform::hash(info.configuration, platform::hash(info.urdf))));
   message.input_hash = text;
-  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
+  return bytes_of(message);
 }
 
 bool decode(Bytes bytes, RunInfo& out) {

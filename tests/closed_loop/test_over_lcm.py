@@ -18,6 +18,7 @@ from stance.replay import verify
 
 SCENES = Path(__file__).with_name("scenes.py")
 DECISIONS = ("JOINT_COMMAND", "FORCE_PLAN", "CONTROLLER_TRACE")
+PLANT = ("USER_COMMAND", "ROBOT_STATE", "TRUTH")
 
 
 def play(scene: str, out: Path) -> dict[str, Any]:
@@ -69,6 +70,27 @@ def assert_same_decisions(first: Path, second: Path) -> None:
 
 def test_lockstep_over_lcm_equals_the_rollout_byte_for_byte(lockstep: Path, rollout: Path) -> None:
     assert_same_decisions(lockstep, rollout)
+
+
+def test_the_rollouts_log_holds_what_lockstep_over_lcm_says_in_its_order(lockstep: Path, rollout: Path) -> None:
+    import lcm
+
+    for channel in PLANT:
+        assert payloads(lockstep, channel, 1000) == payloads(rollout, channel, 1000), channel
+    assert len(payloads(rollout, "TRUTH", 1000)) == 901  # of each instant, and of the end
+    order = [event.channel for event in lcm.EventLog(str(rollout))]
+    answer = ["FORCE_PLAN", "JOINT_COMMAND", "CONTROLLER_TRACE"]
+    assert order[:2] == ["RUN_INFO_SIMULATOR", "RUN_INFO_CONTROLLER"]
+    assert order[2:] == ["USER_COMMAND", *(["ROBOT_STATE", "TRUTH", *answer] * 900), "TRUTH"]
+
+
+def test_the_rollouts_log_explains_itself(lockstep: Path, rollout: Path) -> None:
+    over_lcm, in_process = (Log.open(log).run() for log in (lockstep, rollout))
+    assert over_lcm.simulator and in_process.simulator
+    assert in_process.simulator.seed == 3
+    for name in ("robot", "seed", "urdf", "configuration", "scenario", "input_hash"):
+        assert getattr(in_process.simulator, name) == getattr(over_lcm.simulator, name), name
+    assert not Log.open(rollout).report.problems()
 
 
 def test_lockstep_over_lcm_twice_gives_the_same_bytes(lockstep: Path, tmp_path: Path) -> None:

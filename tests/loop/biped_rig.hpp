@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "controller/compose.hpp"
+#include "controller/io/lcm_bytes.hpp"
 #include "controller/loop/wall_clock.hpp"
 #include "sim/simulator.hpp"
 
@@ -16,20 +17,9 @@ namespace stance::test {
 
 using ByteVector = std::vector<std::uint8_t>;
 
-template <typename Lcm>
-ByteVector bytes_of(const Lcm& message) {
-  ByteVector bytes(static_cast<std::size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
+using io::bytes_of;
+using io::decoded;
 inline ByteVector bytes_of(const io::Message& message) { return {message.bytes().begin(), message.bytes().end()}; }
-
-template <typename Lcm>
-Lcm decoded(io::Bytes bytes) {
-  Lcm message{};
-  message.decode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return message;
-}
 
 config::RobotDescription biped();
 /// The biped's YAML with another value (as YAML text) at a path as in "controller.safety.hold_time".

@@ -1,14 +1,15 @@
 #include <catch2/catch_test_macros.hpp>
 #include <cmath>
 #include <cstdint>
-#include <vector>
 
 #include "controller/centroidal/centroidal.hpp"
+#include "controller/io/lcm_bytes.hpp"
 #include "tests/sim/robots.hpp"
 
 namespace stance::sim {
 namespace {
 
+using io::bytes_of;
 using stance_msgs::force_plan_t;
 using stance_msgs::joint_command_t;
 using stance_msgs::push_t;
@@ -16,13 +17,6 @@ using stance_msgs::robot_state_t;
 using stance_msgs::truth_t;
 
 Vector3 vector(const double (&v)[3]) { return {v[0], v[1], v[2]}; }
-
-template <typename Message>
-std::vector<std::uint8_t> bytes_of(const Message& message) {
-  std::vector<std::uint8_t> bytes(static_cast<std::size_t>(message.getEncodedSize()));
-  message.encode(bytes.data(), 0, static_cast<int>(bytes.size()));
-  return bytes;
-}
 
 /// A biped that is commanded to hold its pose: it stands for a while, then tips over.
 struct Run {
