@@ -21,16 +21,15 @@ import numpy.typing as npt
 from .errors import UnreadableError
 from .events import Buffer, EventIndex, Offsets, Skipped, gather, index_events
 from .messages import CHANNELS, OPERATOR_CHANNELS, SELF_TEST_CHANNEL, MessageType, message_types
-from .series import Array, Integers, Run, RunInfo
+from .series import Array, Integers, Run, RunInfo, missing_after, restarted
 
 if TYPE_CHECKING:
     import pandas as pd
 
 CHUNK_BYTES = 256 << 10  # of payloads decoded at a time: what fits a core's cache
+MOST_LATE = 100  # messages that one may arrive behind its successors; what is further back is of another session
 RUN_INFO_TYPE = "run_info_t"  # repeated every second, byte for byte, so that any part of a log explains itself
 NOT_COLUMNS = ("tag",)  # fields that a DataFrame leaves out
-
-Keys = Mapping[str, Integers]
 
 
 @dataclass(frozen=True)
@@ -121,7 +120,7 @@ class LogReport:
                 found.append(f"{channel.name}: {channel.duplicates} messages were sent again, byte for byte")
             if channel.out_of_order:
                 found.append(f"{channel.name}: {channel.out_of_order} messages arrived late and were sorted")
-            if channel.restarts and channel.name not in OPERATOR_CHANNELS:
+            if channel.restarts:
                 found.append(f"{channel.name}: its sender was started again {channel.restarts} times")
         return found
 
@@ -137,10 +136,12 @@ class LogMessages:
         offsets: Offsets,
         sizes: Integers,
         received: Integers,
+        session: Integers | None = None,
     ) -> None:
         self.channel = channel
         self.type = message_type
         self.received = received
+        self.session = np.zeros(len(offsets), np.int64) if session is None else session
         self.offsets = offsets
         self.sizes = sizes
         self._buffer = buffer
@@ -174,9 +175,17 @@ class LogMessages:
 
     def take(self, rows: slice | npt.NDArray[Any]) -> LogMessages:
         """The chosen rows of it, as messages."""
-        return LogMessages(
-            self.channel, self.type, self._buffer, self.offsets[rows], self.sizes[rows], self.received[rows]
+        taken = LogMessages(
+            self.channel,
+            self.type,
+            self._buffer,
+            self.offsets[rows],
+            self.sizes[rows],
+            self.received[rows],
+            self.session[rows],
         )
+        taken._columns = {name: values[..., rows] for name, values in self._columns.items()}
+        return taken
 
     def payload(self, row: int) -> bytes:
         """The encoded message, fingerprint included."""
@@ -252,8 +261,7 @@ class Log:
         self.index = index
         self._buffer = buffer
         self.channels: dict[str, LogMessages] = {}
-        """every channel of a known type, duplicates left out, sorted by (run, utime, seq)"""
-        self._keys: dict[str, Keys] = {}
+        """every channel of a known type, duplicates left out, sorted by (run, session, seq)"""
         self.report = self._read()
 
     @classmethod
@@ -289,7 +297,7 @@ class Log:
             held = ", ".join(self.channels) or "no known channel"
             raise UnreadableError(f"{self.path}: no ROBOT_STATE in it, so no run; it holds {held}")
         states = self.channels["ROBOT_STATE"]
-        ids = self._keys["ROBOT_STATE"]["run_id"]
+        ids = states.field("run_id")
         if run_id is None:
             run_id = max(self.run_ids, key=lambda candidate: int((ids == candidate).sum()))
         elif run_id not in self.run_ids:
@@ -298,9 +306,9 @@ class Log:
         first, last = int(own.received.min()), int(own.received.max())
         chosen: dict[str, LogMessages] = {}
         for name, messages in self.channels.items():
-            rows = self._keys[name]["run_id"] == run_id
+            rows = messages.field("run_id") == run_id
             if name in OPERATOR_CHANNELS:
-                foreign = ~np.isin(self._keys[name]["run_id"], self.run_ids)
+                foreign = ~np.isin(messages.field("run_id"), self.run_ids)
                 rows |= foreign & (messages.received >= first) & (messages.received <= last)
             part = messages.take(rows)
             if len(part):
@@ -323,7 +331,7 @@ class Log:
         messages = self.channels.get(channel)
         if messages is None:
             return None
-        rows = np.flatnonzero(~np.isin(self._keys[channel]["run_id"], self.run_ids) & (messages.received <= received))
+        rows = np.flatnonzero(~np.isin(messages.field("run_id"), self.run_ids) & (messages.received <= received))
         return messages.take(rows[np.argmax(messages.received[rows])][None]) if len(rows) else None
 
     def payload_bytes(self, offset: int, length: int) -> bytes:
@@ -388,38 +396,36 @@ class Log:
     def _add_channel(self, report: ChannelReport, messages: LogMessages, run_order: list[int]) -> None:
         if messages.type.dtype is None:
             messages = messages.take(self._decodable(messages, report))
-        keys = {name: values.astype(np.int64) for name, values in messages._decode(("run_id", "utime", "seq")).items()}
+        keys = messages._decode(("run_id", "utime", "seq"))
         rank = np.full(len(messages), len(run_order), np.int64)
         for place, run_id in enumerate(run_order):
             rank[keys["run_id"] == run_id] = place
-        same_run = rank[1:] == rank[:-1]
-        report.out_of_order = int((same_run & (keys["utime"][1:] < keys["utime"][:-1])).sum())
-        order = np.lexsort((keys["seq"], keys["utime"], rank))
-        if not np.array_equal(order, np.arange(len(order))):
-            messages = messages.take(order)
-            keys = {name: values[order] for name, values in keys.items()}
-        same = np.ones(max(len(messages) - 1, 0), bool)
-        for values in keys.values():
-            same &= values[1:] == values[:-1]
-        again = np.flatnonzero(same) + 1
+        if (np.diff(rank) < 0).any():
+            order = np.argsort(rank, kind="stable")
+            messages, rank = messages.take(order), rank[order]
+        if report.name not in OPERATOR_CHANNELS:  # whose numbers are those of many hands: in the order of arrival
+            seq = messages.field("seq")
+            messages.session = _sessions(rank, seq)
+            late = (np.diff(rank) == 0) & (np.diff(messages.session) == 0) & (np.diff(seq) < 0)
+            report.out_of_order = int(late.sum())
+            if report.out_of_order:
+                messages = messages.take(np.lexsort((seq, messages.session, rank)))
+        keys = messages._decode(("run_id", "utime", "seq"))
+        again = np.flatnonzero(np.all([np.diff(values) == 0 for values in keys.values()], axis=0)) + 1
         if len(again):
             identical = np.array([messages.payload(row) == messages.payload(row - 1) for row in again.tolist()])
             report.duplicates = int(identical.sum())
             report.conflicting = int((~identical).sum())
-            kept = np.ones(len(messages), bool)
-            kept[again[identical]] = False
-            messages = messages.take(kept)
-            keys = {name: values[kept] for name, values in keys.items()}
+            messages = messages.take(np.setdiff1d(np.arange(len(messages)), again[identical]))
         report.count = len(messages)
         if len(messages) > 1:
-            step_run = keys["run_id"][1:] == keys["run_id"][:-1]
-            step = np.where(step_run, np.diff(keys["seq"]), 1)
-            report.restarts = int((step < 0).sum())
-            report.gaps = [Gap(int(keys["utime"][i]), int(step[i]) - 1) for i in np.flatnonzero(step > 1).tolist()]
-            span = float(np.diff(keys["utime"])[step_run].sum()) * 1e-6
-            report.rate = float(step_run.sum()) / span if span > 0.0 else 0.0
+            utime, missing = messages.field("utime"), missing_after(messages)
+            report.restarts = int(restarted(messages).sum())
+            report.gaps = [Gap(int(utime[i]), int(missing[i])) for i in np.flatnonzero(missing).tolist()]
+            same_run = np.diff(messages.field("run_id")) == 0
+            span = float(np.diff(utime)[same_run].sum()) * 1e-6
+            report.rate = float(same_run.sum()) / span if span > 0.0 else 0.0
         self.channels[report.name] = messages
-        self._keys[report.name] = keys
 
     def _decodable(self, messages: LogMessages, report: ChannelReport) -> npt.NDArray[np.bool_]:
         """Which messages of a type with strings the generated decode can read."""
@@ -461,6 +467,19 @@ def _type_of(
     for offset, length in zip(offsets[:1].tolist(), lengths[:1].tolist(), strict=True):
         return types.get(bytes(buffer[offset : offset + min(length, 8)]))
     return None
+
+
+def _sessions(rank: Integers, seq: Integers) -> Integers:
+    """How often the sender had been started again in its run before each message, in order of arrival; (n,).
+
+    A sender counts from 1. What falls back by less, or not to 1, arrived late.
+    """
+    if not len(seq):
+        return np.zeros(0, np.int64)
+    step, new_run = np.diff(seq), np.diff(rank) != 0
+    count = np.append(0, np.cumsum(~new_run & ((step < -MOST_LATE) | ((step < 0) & (seq[1:] == 1)))))
+    first = np.append(0, np.flatnonzero(new_run) + 1)
+    return np.asarray(count - np.repeat(count[first], np.diff(np.append(first, len(seq)))), np.int64)
 
 
 def _has_fingerprint(buffer: Buffer, offsets: Offsets, lengths: Integers, fingerprint: bytes) -> npt.NDArray[np.bool_]:

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import configuration
-from .messages import CHANNELS, OPERATOR_CHANNELS
-from .series import Array, Floats, Integers, Run, match
+from .messages import CHANNELS
+from .series import Array, Floats, Integers, Run, match, missing_after, restarted
 from .urdf import rotation_from_quaternion
 
 if TYPE_CHECKING:
@@ -297,7 +297,7 @@ def measure(run: Run, report: LogReport | None = None) -> Metrics:
         faults=faults(run),
         safety=safety(run),
         channels=channels(run),
-        log=None if report is None else log_quality(report),
+        log=None if report is None else log_quality(run, report),
     )
 
 
@@ -383,9 +383,9 @@ def center_of_mass(run: Run) -> CenterOfMass | None:
 def risen(run: Run, counter: str) -> Integers:
     """By how much a counter of CONTROLLER_TIMING rose before each message, (n,); not what it had before the run."""
     total = run.field("CONTROLLER_TIMING", counter)
-    fresh = run.field("CONTROLLER_TIMING", "seq") == 1
-    before = np.concatenate([total[:1], total[:-1]])
-    return np.asarray(np.maximum(np.where(fresh, total, total - before), 0), np.int64)
+    before = np.append(total[:1], total[:-1])
+    before[(run.field("CONTROLLER_TIMING", "seq") == 1) | restarted(run.channels["CONTROLLER_TIMING"])] = 0
+    return np.asarray(np.maximum(total - before, 0), np.int64)
 
 
 def is_lockstep(run: Run) -> bool:
@@ -660,8 +660,7 @@ def faults(run: Run) -> dict[str, int]:
     if "CONTROLLER_TRACE" not in run:
         return {}
     count = run.field("CONTROLLER_TRACE", "fault_count")
-    session = run.session("CONTROLLER_TRACE")
-    last = np.append(np.flatnonzero(np.diff(session)), len(session) - 1)
+    last = np.append(np.flatnonzero(restarted(run.channels["CONTROLLER_TRACE"])) - 1, len(count) - 1)
     total = count[last].sum(axis=0)
     return {_name(FAULTS, i): int(value) for i, value in enumerate(total.tolist())}
 
@@ -682,20 +681,18 @@ def channels(run: Run) -> list[ChannelUse]:
     for name in sorted(
         run, key=lambda channel: list(CHANNELS).index(channel) if channel in CHANNELS else len(CHANNELS)
     ):
-        seq = run.field(name, "seq")
-        utime = run.field(name, "utime")
-        step = np.diff(seq)
+        messages, utime = run.channels[name], run.field(name, "utime")
         span = float(utime[-1] - utime[0]) * 1e-6
-        missing = 0 if name in OPERATOR_CHANNELS else int(np.maximum(step - 1, 0).sum())
-        rate = (len(seq) - 1) / span if span > 0.0 else 0.0
-        found.append(ChannelUse(name, len(seq), rate, missing, int((step < 0).sum())))
+        rate = (len(utime) - 1) / span if span > 0.0 else 0.0
+        missing, restarts = int(missing_after(messages).sum()), int(restarted(messages).sum())
+        found.append(ChannelUse(name, len(utime), rate, missing, restarts))
     return found
 
 
-def log_quality(report: LogReport) -> LogQuality:
-    """What of the log file itself is amiss."""
+def log_quality(run: Run, report: LogReport) -> LogQuality:
+    """What of the log file itself is amiss; what is missing, of this run alone."""
     problems = report.problems()
-    missing = sum(channel.missing for channel in report.channels)
+    missing = sum(use.missing for use in channels(run))
     return LogQuality(not problems, missing, report.skipped_bytes, problems)
 
 

@@ -20,7 +20,10 @@ Integers = npt.NDArray[np.int64]
 
 
 class Messages(Protocol):
-    """The messages of one channel, sorted by (utime, seq). n is their number."""
+    """The messages of one channel, sorted by (session, seq); what is sent by hand as it came. n is their number.
+
+    Not by utime: a tick without a new state is stamped ahead of it, so that the next one's stamp may be earlier.
+    """
 
     @property
     def channel(self) -> str: ...
@@ -28,6 +31,11 @@ class Messages(Protocol):
     @property
     def received(self) -> Integers:
         """us, wall clock of the logger, shape (n,)"""
+        ...
+
+    @property
+    def session(self) -> Integers:
+        """how often the sender had been started again in its run before each message, shape (n,)"""
         ...
 
     @property
@@ -150,12 +158,25 @@ class Run:
 
     def _ticks(self, channel: str) -> Integers:
         """A number for each tick that stays unique when the controller is started again within the run."""
-        return self.session(channel) * (1 << 40) + self.field(channel, "seq")
+        return self.channels[channel].session * (1 << 40) + self.field(channel, "seq")
 
-    def session(self, channel: str) -> Integers:
-        """0, 1, ... : how often the sender had been started again before each message, shape (n,)."""
-        seq = self.field(channel, "seq")
-        return np.concatenate([[0], np.cumsum(np.diff(seq) < 0)]).astype(np.int64)[: len(seq)]
+
+def missing_after(messages: Messages) -> Integers:
+    """How many messages that its sender numbered the log lacks after each, (n,). None of what is sent by hand."""
+    if messages.channel in OPERATOR_CHANNELS or not len(messages):
+        return np.zeros(len(messages), np.int64)
+    step = np.where(_same_sender(messages), np.diff(messages.field("seq")), 1)
+    return np.append(np.maximum(step - 1, 0), 0)
+
+
+def restarted(messages: Messages) -> npt.NDArray[np.bool_]:
+    """Whether the sender was started again just before each message, (n,); a run's first sender is not."""
+    return np.append(np.zeros(min(len(messages), 1), bool), np.diff(messages.session) > 0)
+
+
+def _same_sender(messages: Messages) -> npt.NDArray[np.bool_]:
+    """Whether a message and the next one are of one session of one run, (n - 1,)."""
+    return np.asarray((np.diff(messages.session) == 0) & (np.diff(messages.field("run_id")) == 0))
 
 
 def match(wanted: Array, keys: Array) -> Integers:

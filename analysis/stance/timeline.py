@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import metrics
-from .messages import OPERATOR_CHANNELS
-from .series import Run
+from .series import Run, missing_after, restarted
 
 MERGE = 0.1  # s, a fault that comes back sooner is still the same one
 
@@ -102,14 +101,12 @@ def _missed(run: Run) -> list[Event]:
 
 def _gaps(run: Run) -> list[Event]:
     found = []
-    for name in run:
-        if name in OPERATOR_CHANNELS:
-            continue
-        time, step = run.time(name), np.diff(run.field(name, "seq"))
-        for row in np.flatnonzero(step > 1).tolist():
-            found.append(Event(float(time[row]), "gap", f"{name}: {step[row] - 1} messages missing", bad=True))
-        for row in np.flatnonzero(step < 0).tolist():
-            found.append(Event(float(time[row + 1]), "restart", f"{name}: its sender was started again", bad=True))
+    for name, messages in run.channels.items():
+        time, missing = run.time(name), missing_after(messages)
+        for row in np.flatnonzero(missing).tolist():
+            found.append(Event(float(time[row]), "gap", f"{name}: {missing[row]} messages missing", bad=True))
+        for row in np.flatnonzero(restarted(messages)).tolist():
+            found.append(Event(float(time[row]), "restart", f"{name}: its sender was started again", bad=True))
     return found
 
 

@@ -6,11 +6,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from stance import metrics
 from stance.errors import UnreadableError
 from stance.log import Log
 from stance.messages import message_type, message_types
 from stance.series import Run, match
-from synthetic import RUN_ID, START, WALL, Synthetic, encode_log, records
+from stance.timeline import timeline
+from synthetic import PERIOD, RUN_ID, START, WALL, Synthetic, encode_log, records
 
 
 def state_events(seqs: list[int], run_id: int = RUN_ID) -> list[tuple[int, str, bytes]]:
@@ -73,7 +75,7 @@ def test_the_run_knows_what_ran(stand: Run) -> None:
     assert stand.controller is not None and "robot name=" in stand.controller.urdf
 
 
-def test_events_are_sorted_by_utime_and_late_ones_are_counted() -> None:
+def test_messages_are_sorted_by_seq_and_late_ones_are_counted() -> None:
     log = Log.from_bytes(encode_log([*state_events([1, 2, 4, 3, 5])]))
     assert log.channels["ROBOT_STATE"].field("seq").tolist() == [1, 2, 3, 4, 5]
     assert log.report.channels[0].out_of_order == 1
@@ -100,6 +102,46 @@ def test_a_sender_that_starts_again_is_no_gap() -> None:
     log = Log.from_bytes(encode_log([*state_events([1]), *traces]))
     report = next(channel for channel in log.report.channels if channel.name == "CONTROLLER_TRACE")
     assert (report.restarts, report.missing) == (1, 0)
+
+
+def test_a_stamp_that_goes_back_is_nothing_amiss() -> None:
+    """A tick without a new state is stamped ahead of the state that then comes."""
+    messages = Synthetic(duration=1.0, pushes=[], late_ticks={70: 25_000.0}).messages()
+    for channel in ("FORCE_PLAN", "JOINT_COMMAND", "CONTROLLER_TRACE"):
+        messages[channel]["utime"][[40, 41, 80]] += 2 * round(PERIOD * 1e6)
+    messages["CONTROLLER_TRACE"]["fault_count"][40:, 0] = 2
+    events = [(WALL + int(row["seq"]), channel, row.tobytes()) for channel, rows in messages.items() for row in rows]
+    log = Log.from_bytes(encode_log(sorted(events)))
+    run = log.run()
+    assert log.report.problems() == []
+    assert run.field("CONTROLLER_TRACE", "seq").tolist() == list(range(1, 102))
+    assert metrics.faults(run)["state_stale"] == 2
+    ticks = metrics.ticks(run)
+    assert ticks is not None and [round(miss.at, 2) for miss in ticks.misses] == [0.70]
+    assert not {"gap", "restart"} & {event.kind for event in timeline(run)}
+
+
+def test_a_sender_that_starts_again_keeps_its_sessions_apart() -> None:
+    log = Log.from_bytes(encode_log(state_events([1, 2, 3, 5, 4, 1, 3, 2, 4])))
+    run = log.run()
+    assert run.field("ROBOT_STATE", "seq").tolist() == [1, 2, 3, 4, 5, 1, 2, 3, 4]
+    assert run.channels["ROBOT_STATE"].session.tolist() == [0] * 5 + [1] * 4
+    report = log.report.channels[0]
+    assert (report.restarts, report.missing, report.out_of_order) == (1, 0, 2)
+
+
+def test_a_sender_whose_first_message_is_lost_has_started_again_all_the_same() -> None:
+    log = Log.from_bytes(encode_log(state_events([*range(1, 301), *range(2, 12)])))
+    assert (log.report.channels[0].restarts, log.report.channels[0].missing) == (1, 0)
+
+
+def test_what_is_sent_by_hand_stays_as_it_came_and_lacks_nothing() -> None:
+    commands = records("user_command_t", 4)
+    commands["seq"], commands["utime"], commands["yaw_rate"] = [7, 2, 9, 1], [5, 4, 3, 2], [0.1, 0.2, 0.3, 0.4]
+    sent = [(WALL + 1 + i, "USER_COMMAND", command.tobytes()) for i, command in enumerate(commands)]
+    log = Log.from_bytes(encode_log(sorted([*state_events([1, 2, 3, 4, 5, 6]), *sent])))
+    assert log.report.problems() == []
+    assert log.run().field("USER_COMMAND", "yaw_rate").tolist() == [0.1, 0.2, 0.3, 0.4]
 
 
 def test_runs_of_one_log_are_kept_apart() -> None:

@@ -345,6 +345,18 @@ def test_the_log_report_is_part_of_the_metrics() -> None:
     assert found.log.missing == 1 and found.log.skipped_bytes > 0
 
 
+def test_what_another_run_lacks_is_not_missing_from_this_one() -> None:
+    first = Synthetic(duration=1.0, pushes=[], run_id=7).events()
+    truths = [i for i, event in enumerate(first) if event[1] == "TRUTH"]
+    kept = [event for i, event in enumerate(first) if i not in truths[20:25]]
+    second = [(at + 10_000_000, *rest) for at, *rest in Synthetic(duration=1.0, pushes=[], run_id=8).events()]
+    log = Log.from_bytes(encode_log([*kept, *second]))  # type: ignore[list-item]
+    for run_id, missing in ((7, 5), (8, 0)):
+        found = measure(log.run(run_id), log.report).log
+        assert found is not None and found.missing == missing
+        assert not found.complete
+
+
 def test_a_part_of_a_run_keeps_its_times(stand: metrics.Run) -> None:
     part = stand.between(1.0, 2.0)
     assert part.span == (pytest.approx(1.0), pytest.approx(2.0))
