@@ -311,28 +311,23 @@ class Log:
                 foreign = ~np.isin(messages.field("run_id"), self.run_ids)
                 rows |= foreign & (messages.received >= first) & (messages.received <= last)
             part = messages.take(rows)
+            if not len(part) and messages.type.name == RUN_INFO_TYPE:
+                part = self._heard_before(messages, last)
             if len(part):
                 chosen[name] = part
-        infos = {
-            name: _run_info(chosen.get(name) or self._heard_before(name, last))
-            for name in ("RUN_INFO_SIMULATOR", "RUN_INFO_CONTROLLER")
-        }
         return Run(
             run_id=run_id,
             start=int(own.field("utime")[0]),
             channels=chosen,
-            simulator=infos["RUN_INFO_SIMULATOR"],
-            controller=infos["RUN_INFO_CONTROLLER"],
+            simulator=_run_info(chosen.get("RUN_INFO_SIMULATOR")),
+            controller=_run_info(chosen.get("RUN_INFO_CONTROLLER")),
             name=self.path.name,
         )
 
-    def _heard_before(self, channel: str, received: int) -> LogMessages | None:
-        """The newest message of a sender that knows no run ids, as of a wall time [us]."""
-        messages = self.channels.get(channel)
-        if messages is None:
-            return None
+    def _heard_before(self, messages: LogMessages, received: int) -> LogMessages:
+        """The newest message of a sender that knows no run ids, as of a wall time [us]; none where there is none."""
         rows = np.flatnonzero(~np.isin(messages.field("run_id"), self.run_ids) & (messages.received <= received))
-        return messages.take(rows[np.argmax(messages.received[rows])][None]) if len(rows) else None
+        return messages.take(rows[np.argsort(messages.received[rows], kind="stable")][-1:])
 
     def payload_bytes(self, offset: int, length: int) -> bytes:
         """What stands in the file at `offset`: an event's payload by `index.data_offset` and `index.data_length`."""

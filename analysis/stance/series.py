@@ -134,7 +134,7 @@ class Run:
         """s since the run's start, shape (n,).
 
         By utime where the sender shares the robot's clock. CONTROLLER_TIMING is stamped by the wall clock, so it takes
-        the time of the trace of the same tick; what an operator sent is placed by when the logger received it.
+        the time of the trace of the same tick; what knows no run or was sent by hand is placed by when it was received.
         """
         if channel not in self._time:
             self._time[channel] = self._time_of(channel)
@@ -150,7 +150,8 @@ class Run:
             if known.any():
                 position = np.arange(len(own), dtype=float)
                 return np.asarray(np.interp(position, position[known], trace[rows[known]]))
-        elif channel in OPERATOR_CHANNELS or (len(own) and (own.min() < -1.0 or own.max() > self.span[1] + 1.0)):
+        foreign = channel in OPERATOR_CHANNELS or (self.field(channel, "run_id") != self.run_id).any()
+        if foreign or (len(own) and (own.min() < -1.0 or own.max() > self.span[1] + 1.0)):
             received, at = self.channels["ROBOT_STATE"].received, self.time("ROBOT_STATE")
             order = np.argsort(received, kind="stable")
             return np.asarray(np.interp(self.channels[channel].received, received[order], at[order]))

@@ -245,7 +245,8 @@ class Synthetic:
 
     def run_info(self, program: str, utime: int, seq: int) -> bytes:
         message = message_type("run_info_t").python_class()
-        message.utime, message.seq, message.run_id, message.seed = utime, seq, self.run_id, self.seed
+        if program != "stance-controller":  # which serves any run
+            message.utime, message.seq, message.run_id, message.seed = utime, seq, self.run_id, self.seed
         message.program, message.version, message.source, message.build = program, "0.1.0", "0123abc", "g++ 12 Release"
         message.robot, message.scenario = "biped", "scenario: demo\n"
         message.options = f"--robot biped --scenario demo {'--realtime' if self.realtime else '--lockstep'}"

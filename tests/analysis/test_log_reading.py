@@ -73,6 +73,28 @@ def test_the_run_knows_what_ran(stand: Run) -> None:
     assert stand.duration == pytest.approx(4.0)
     assert stand.simulator is not None and stand.simulator.program == "stance-sim"
     assert stand.controller is not None and "robot name=" in stand.controller.urdf
+    told = {use.name: use.count for use in metrics.channels(stand)}
+    assert (told["RUN_INFO_SIMULATOR"], told["RUN_INFO_CONTROLLER"]) == (5, 1)
+    assert stand.frame("RUN_INFO_CONTROLLER")["t"].tolist() == [0.0]
+
+
+def test_a_run_is_described_by_what_was_heard_of_the_controller_last_before_its_end() -> None:
+    def info(at: int, version: str) -> tuple[int, str, bytes]:
+        message = message_type("run_info_t").python_class()
+        message.version, message.tag = version, bytes(16)
+        return WALL + at, "RUN_INFO_CONTROLLER", message.encode()
+
+    states = [
+        (at + 10 * at_run, *rest)
+        for at_run, run_id in enumerate((7, 8))
+        for at, *rest in state_events([1, 2, 3], run_id)
+    ]
+    log = Log.from_bytes(
+        encode_log(sorted([info(-9, "older"), info(-5, "old"), info(5, "new"), info(99, "late"), *states]))
+    )
+    first, second = log.run(7).controller, log.run(8).controller
+    assert first is not None and second is not None
+    assert (first.version, second.version) == ("old", "new")
 
 
 def test_messages_are_sorted_by_seq_and_late_ones_are_counted() -> None:
