@@ -17,7 +17,7 @@ from typing import Any
 
 from . import __version__
 from .errors import GOOD, LIMIT_VIOLATED, USAGE, StanceError
-from .plain import to_json
+from .plain import counted, to_json
 
 INTERRUPTED = 130
 
@@ -192,7 +192,8 @@ def _replay(options: argparse.Namespace) -> int:
         "duration_s": done_playing.duration,
         "wall_s": done_playing.wall,
     }
-    words = f"{done_playing.messages} messages, {done_playing.duration:.2f} s of the log in {done_playing.wall:.2f} s"
+    played = counted(done_playing.messages, "message")
+    words = f"{played}, {done_playing.duration:.2f} s of the log in {done_playing.wall:.2f} s"
     _print(options, result, lambda: words)
     return GOOD
 

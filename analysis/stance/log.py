@@ -21,6 +21,7 @@ import numpy.typing as npt
 from .errors import UnreadableError
 from .events import Buffer, EventIndex, Offsets, Skipped, gather, index_events
 from .messages import CHANNELS, OPERATOR_CHANNELS, SELF_TEST_CHANNEL, MessageType, message_types
+from .plain import counted
 from .series import Array, Integers, Run, RunInfo, missing_after, restarted
 
 if TYPE_CHECKING:
@@ -99,29 +100,26 @@ class LogReport:
 
     def problems(self) -> list[str]:
         """One sentence for each thing that is not as it should be; empty for a clean log."""
-        found = [f"{part.length} bytes skipped at offset {part.offset}: {part.reason}" for part in self.skipped]
+        found = [
+            f"{counted(part.length, 'byte')} skipped at offset {part.offset}: {part.reason}" for part in self.skipped
+        ]
         found += [f"the event at offset {at} precedes damaged bytes: its payload may be damaged" for at in self.suspect]
         if self.lost_numbers:
-            found.append(f"{self.lost_numbers} event numbers are absent from the file")
+            found.append(f"{counted(self.lost_numbers, 'event number')} absent from the file")
         for channel in self.channels:
             if not channel.type_name:
-                found.append(f"{channel.name}: unknown type, {channel.bytes} bytes not read")
-            if channel.wrong_type:
-                found.append(f"{channel.name}: {channel.wrong_type} messages of another or older type not read")
-            if channel.wrong_size:
-                found.append(f"{channel.name}: {channel.wrong_size} messages of the wrong size not read")
-            if channel.gaps:
-                found.append(f"{channel.name}: {channel.missing} messages missing in {len(channel.gaps)} gaps")
-            if channel.conflicting:
-                found.append(
-                    f"{channel.name}: {channel.conflicting} messages differ from another of the same utime and seq"
-                )
-            if channel.duplicates and channel.type_name != RUN_INFO_TYPE:
-                found.append(f"{channel.name}: {channel.duplicates} messages were sent again, byte for byte")
-            if channel.out_of_order:
-                found.append(f"{channel.name}: {channel.out_of_order} messages arrived late and were sorted")
+                found.append(f"{channel.name}: unknown type, {counted(channel.bytes, 'byte')} not read")
+            told = (
+                (channel.wrong_type, "of another or older type not read"),
+                (channel.wrong_size, "of the wrong size not read"),
+                (channel.missing, f"missing in {counted(len(channel.gaps), 'gap')}"),
+                (channel.conflicting, "not like another of the same utime and seq"),
+                (channel.duplicates if channel.type_name != RUN_INFO_TYPE else 0, "sent again, byte for byte"),
+                (channel.out_of_order, "late, now sorted"),
+            )
+            found += [f"{channel.name}: {counted(count, 'message')} {what}" for count, what in told if count]
             if channel.restarts:
-                found.append(f"{channel.name}: its sender was started again {channel.restarts} times")
+                found.append(f"{channel.name}: its sender was started again {counted(channel.restarts, 'time')}")
         return found
 
 

@@ -1,10 +1,15 @@
-"""Results as JSON that every reader takes."""
+"""Results as text: JSON that every reader takes, and counts in words."""
 
 from __future__ import annotations
 
 import json
 import math
 from typing import Any
+
+
+def counted(count: int, noun: str) -> str:
+    """As in "1 gap" and "2 gaps"."""
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
 def to_json(document: Any) -> str:

@@ -15,6 +15,7 @@ from . import configuration, metrics, style
 from .check import Verdict
 from .metrics import Metrics, Percentiles
 from .picture import picture
+from .plain import counted
 from .series import Array, Floats, Run
 from .style import new_figure, shade, styled, time_axis
 
@@ -106,7 +107,7 @@ def _run_facts(run: Run, measured: Metrics) -> list[tuple[str, str]]:
         tick = measured.timing.tick_us
         facts.append(("tick time", f"p50 {tick.p50:.0f}, p99 {tick.p99:.0f}, max {tick.max:.0f} µs"))
     if measured.log is not None:
-        whole = "complete" if measured.log.complete else f"{len(measured.log.problems)} remarks"
+        whole = "complete" if measured.log.complete else counted(len(measured.log.problems), "remark")
         facts.append(("log", whole))
     return facts
 
@@ -150,7 +151,7 @@ def timing(run: Run) -> Figure:
     top = float(np.percentile(tick, 99.5)) * 1.35
     ax.set_ylim(0.0, max(top, 1.0))
     above = int((tick > top).sum())
-    note = f"deadline at {deadline:,.0f} µs" + (f"; {above} ticks reach beyond this axis" if above else "")
+    note = f"deadline at {deadline:,.0f} µs" + (f"; beyond this axis: {counted(above, 'tick')}" if above else "")
     ax.text(0.995, 0.97, note, transform=ax.transAxes, ha="right", va="top", fontsize=7.5, color=style.MUTED)
     handles, labels = ax.get_legend_handles_labels()
     ax.legend(handles[::-1], labels[::-1], loc="center left", bbox_to_anchor=(1.0, 0.5), labelspacing=0.25)

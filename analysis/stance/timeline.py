@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import metrics
+from .plain import counted
 from .series import Run, missing_after, restarted
 
 MERGE = 0.1  # s, a fault that comes back sooner is still the same one
@@ -104,7 +105,9 @@ def _gaps(run: Run) -> list[Event]:
     for name, messages in run.channels.items():
         time, missing = run.time(name), missing_after(messages)
         for row in np.flatnonzero(missing).tolist():
-            found.append(Event(float(time[row]), "gap", f"{name}: {missing[row]} messages missing", bad=True))
+            found.append(
+                Event(float(time[row]), "gap", f"{name}: {counted(missing[row], 'message')} missing", bad=True)
+            )
         for row in np.flatnonzero(restarted(messages)).tolist():
             found.append(Event(float(time[row]), "restart", f"{name}: its sender was started again", bad=True))
     return found

@@ -115,6 +115,8 @@ def test_gaps_are_found_with_their_size() -> None:
     log = Log.from_bytes(encode_log(state_events([1, 2, 5, 6, 10])))
     assert [(gap.after_utime, gap.missing) for gap in log.report.channels[0].gaps] == [(2000, 2), (6000, 3)]
     assert log.report.problems() == ["ROBOT_STATE: 5 messages missing in 2 gaps"]
+    log = Log.from_bytes(encode_log(state_events([1, 3])))
+    assert log.report.problems() == ["ROBOT_STATE: 1 message missing in 1 gap"]
 
 
 def test_a_sender_that_starts_again_is_no_gap() -> None:
