@@ -1,5 +1,9 @@
+#include <Eigen/Cholesky>
+#include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <catch2/catch_test_macros.hpp>
 #include <limits>
+#include <random>
 
 #include "tests/sim/robots.hpp"
 
@@ -71,6 +75,64 @@ TEST_CASE("DampedDrivesOpposeTheVelocityAlone") {
   const JointVector torque = drive_torque(robot.model, command, JointVector::Zero(), qd);
   for (int i = 0; i < kMaxJoints; ++i) CHECK(torque[i] == -(1.0 + i) * qd[i]);
   CHECK(damping_torque(robot.model, JointVector::Constant(3.0), qd) == JointVector(-3.0 * qd));
+}
+
+namespace {
+
+/// lambda_max(M_q^-1 K) dt / 2 of the free-floating robot in posture `q`, with M_q what the joints feel of its mass and
+/// K its damping: below 1, rates that are damped once a physics step die out. Feet that stand add to what joints feel.
+double damping_share(const config::RobotDescription& robot, const JointVector& q) {
+  rigid_body::State state;
+  state.q = q;
+  rigid_body::MatrixNu M;
+  rigid_body::mass_matrix(robot.model, state, M);
+  const int n = robot.model.num_joints;
+  const Eigen::MatrixXd base = M.topLeftCorner(6, 6), cross = M.topRightCorner(6, n);
+  const Eigen::MatrixXd M_q = M.bottomRightCorner(n, n) - cross.transpose() * base.ldlt().solve(cross);
+  const Eigen::MatrixXd K = robot.drives.damping.head(n).asDiagonal();
+  const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::MatrixXd> pencil(K, M_q, Eigen::EigenvaluesOnly);
+  return 0.5 * kPhysicsStep * pencil.eigenvalues().maxCoeff();
+}
+
+}  // namespace
+
+TEST_CASE("DampedDrivesAreStableAtThePhysicsStepInEveryPosture") {
+  const auto robot = test::biped();
+  const int n = robot.model.num_joints;
+  constexpr int levels = 5;  // of each joint of a leg from limit to limit, both legs alike
+  constexpr int grid = levels * levels * levels * levels;
+  constexpr int postures = grid + 2000;  // the others random
+  std::mt19937_64 random(1);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  double worst = 0.0;
+  for (int posture = 0; posture < postures; ++posture) {
+    JointVector q = JointVector::Zero();
+    int digits = posture;
+    for (int i = 0; i < n; ++i) {
+      if (i == n / 2) digits = posture;
+      const double level = static_cast<double>(digits % levels) / (levels - 1);
+      digits /= levels;
+      const auto& joint = robot.model.joints[static_cast<std::size_t>(i)];
+      q[i] = joint.lower + (posture < grid ? level : uniform(random)) * (joint.upper - joint.lower);
+    }
+    worst = std::max(worst, damping_share(robot, q));
+  }
+  INFO("worst " << worst << ", nominal " << damping_share(robot, robot.nominal_joint_position));
+  CHECK(worst < 1.0);
+}
+
+TEST_CASE("DampingIsStableInTheWorldWhereTheMassMatrixSaysSo") {
+  const auto robot = test::biped();
+  const double nominal = damping_share(robot, robot.nominal_joint_position);
+  for (const double share : {0.9, 1.1}) {
+    WorldSetup setup = test::biped_world(20.0);
+    for (int i = 0; i < robot.model.num_joints; ++i) setup.initial.qd[i] = i % 3 == 0 ? 1e-4 : -1e-4;
+    World world(setup);
+    const JointVector damping = robot.drives.damping * (share / nominal);
+    for (int i = 0; i < 50; ++i) world.step(damping_torque(robot.model, damping, world.state().qd), {});
+    INFO("rates of " << setup.initial.qd.norm() << " rad/s are " << world.state().qd.norm() << " after 50 ms");
+    CHECK((world.state().qd.norm() < setup.initial.qd.norm()) == (share < 1.0));
+  }
 }
 
 TEST_CASE("StoppedDrivesGiveNoTorque") {
