@@ -283,9 +283,9 @@ TEST_CASE("CompositeInertiaIsTheAngularMomentumOfTheRobotTurningAsOneBody") {
 
 TEST_CASE("FixedBaseArmMatchesIndependentTorquesAndMassMatrix") {
   const std::vector<std::string> order{"j1", "j2", "j3", "j4", "j5"};
-  const Model model = model_from_urdf(read_file("tests/golden/arm5.urdf"), order);
+  const Model model = model_from_urdf(golden_text("arm5.urdf"), order);
   const YAML::Node file = load_golden("rnea_arm5.json");
-  for (const YAML::Node& c : file["cases"]) {
+  for (const YAML::Node& c : golden_cases(file)) {
     State state;
     state.q.head<5>() = golden_vector<5>(c, "q");
     state.qd.head<5>() = golden_vector<5>(c, "dq");

@@ -46,8 +46,7 @@ LegGeometry uneven_leg() {
 
 TEST_CASE("LegReproducesTheReferenceTransformsMassCentresAndJacobians") {
   const YAML::Node file = load_golden("leg000.json");
-  REQUIRE(file["cases"].size() == 40);
-  for (const YAML::Node& c : file["cases"]) {
+  for (const YAML::Node& c : golden_cases(file)) {
     LegGeometry leg;
     const Eigen::Vector4d length = golden_vector<4>(c, "L"), com_offset = golden_vector<4>(c, "l");
     for (int i = 0; i < 4; ++i) {

@@ -75,7 +75,7 @@ void check_chain(const std::string& file_name) {
   const YAML::Node file = load_golden(file_name);
   const Chain chain(file);
   const Eigen::VectorXd zero = Eigen::VectorXd::Zero(chain.tree.num_joints);
-  for (const YAML::Node& c : file["cases"]) {
+  for (const YAML::Node& c : golden_cases(file)) {
     const Eigen::VectorXd theta = golden_vector(c, "theta"), thetad = golden_vector(c, "dtheta"),
                           thetadd = golden_vector(c, "ddtheta");
     const Vector3 g = golden_vector<3>(c, "g");
@@ -107,7 +107,7 @@ TEST_CASE("NewtonEulerReproducesTheSixJointArm") { check_chain("rnea_ur5.json");
 TEST_CASE("NewtonEulerOfASingleBodyIsItsWrenchAtTheCentreOfMass") {
   // f = m (vd + omega x v), moment = I omegad + omega x I omega (8.22, 8.23).
   const YAML::Node file = load_golden("wrench003.json");
-  for (const YAML::Node& c : file["cases"]) {
+  for (const YAML::Node& c : golden_cases(file)) {
     ScrewTree body;
     body.G[0] = {golden_matrix<3, 3>(c, "I"), golden_number(c, "m")};
     Vector6 V, Vd, expected, F;

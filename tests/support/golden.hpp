@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <iterator>
 #include <stdexcept>
 #include <string>
 
@@ -25,6 +27,21 @@ inline YAML::Node load_golden(const std::string& file) {
   } catch (const YAML::Exception& error) {
     throw std::runtime_error("golden file " + path.string() + ": " + error.what());
   }
+}
+
+/// The cases of a file: at least one, lest a test pass on none.
+inline YAML::Node golden_cases(const YAML::Node& file) {
+  const YAML::Node cases = file["cases"];
+  if (!cases || cases.size() == 0) throw std::runtime_error("a golden file has no cases");
+  return cases;
+}
+
+/// A whole file as text, as "arm5.urdf". Throws std::runtime_error naming the path where it cannot be read.
+inline std::string golden_text(const std::string& file) {
+  const std::filesystem::path path = golden_directory() / file;
+  std::ifstream stream(path);
+  if (!stream) throw std::runtime_error("golden file " + path.string() + ": cannot be read");
+  return {std::istreambuf_iterator<char>(stream), std::istreambuf_iterator<char>()};
 }
 
 /// A list of numbers. Rows may be Eigen::Dynamic; a fixed size must fit exactly, else std::runtime_error.
