@@ -9,7 +9,7 @@ namespace stance::estimation {
 TEST_CASE("BallFilterEqualsTheReferenceVectors") {
   constexpr double kTolerance = 1e-10;
   const YAML::Node golden = test::load_golden("ball_kf001.json");
-  for (const YAML::Node& run : golden["cases"]) {
+  for (const YAML::Node& run : test::golden_cases(golden)) {
     const double dt = test::golden_number(run, "dt");
     const Eigen::Vector3d g(0.0, test::golden_number(run, "g"), 0.0);
     KalmanFilter<6, 3> filter;
@@ -25,6 +25,7 @@ TEST_CASE("BallFilterEqualsTheReferenceVectors") {
     H.leftCols<3>().setIdentity();
     const YAML::Node steps = run["steps"];
     const YAML::Node z = run["z"];
+    REQUIRE(steps.size() > 0);
     for (std::size_t k = 0; k < steps.size(); ++k) {
       filter.predict(F, Bu, Q);
       CHECK(test::max_difference(filter.x, test::golden_vector<6>(steps[k], "x_prior")) < kTolerance);
