@@ -5,6 +5,7 @@
 #include <catch2/catch_message.hpp>
 #include <catch2/catch_test_macros.hpp>
 #include <chrono>
+#include <cmath>
 #include <condition_variable>
 #include <functional>
 #include <map>
@@ -17,6 +18,7 @@
 #include <stop_token>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "controller/loop/loop.hpp"
@@ -37,6 +39,8 @@ using test::decoded;
 
 constexpr std::int64_t kRun = 7;
 constexpr auto kPeriod = std::chrono::milliseconds(10);
+constexpr double kClockRounding = 1e-6;               // us
+constexpr double kStampStep = 1.0;                    // us, of start stamps
 constexpr auto kPatience = std::chrono::seconds(60);  // for what should take a second, also under a sanitizer
 
 /// Raises `stop` after kPatience, so that a loop that hangs fails its test.
@@ -56,7 +60,7 @@ class Watchdog {
 
 /// A controller on memory's LCM, and all that it published.
 struct Bench {
-  Bench() {
+  explicit Bench(TickFunction tick = compose(test::biped())) : ticker(std::move(tick)) {
     for (const char* name : {io::channel::kForcePlan, io::channel::kJointCommand, io::channel::kTrace,
                              io::channel::kTiming, io::channel::kRunInfo}) {
       transport.subscribe(name, [this, name](io::Bytes bytes) {
@@ -90,7 +94,7 @@ struct Bench {
   }
 
   io::Transport transport{"memq://"};
-  Ticker ticker{compose(test::biped())};
+  Ticker ticker;
   std::atomic<bool> stop{false};
   ByteVector run_info{1, 2, 3};
   std::map<std::string, std::function<void()>> reactions;
@@ -140,6 +144,31 @@ void run_lockstep_through(Bench& bench, const std::vector<ByteVector>& states,
   });
   run_lockstep(bench.ticker, bench.transport, bench.run_info, bench.stop);
   REQUIRE(next == states.size());
+}
+
+/// What holds of every tick's timing and of the next one's, however slow or stalled the machine.
+void check_timings(const std::vector<controller_timing_t>& timings) {
+  for (std::size_t k = 0; k < timings.size(); ++k) {
+    CAPTURE(k);
+    const controller_timing_t& timing = timings[k];
+    double stages = 0.0;
+    for (const double stage : timing.stage_us) {
+      CHECK(stage >= 0.0);
+      stages += stage;
+    }
+    CHECK(stages > 0.0);
+    CHECK(stages <= timing.tick_us + kClockRounding);
+    CHECK(timing.cpu_us >= 0.0);
+    CHECK(timing.wake_latency_us >= 0.0);
+    if (k == 0) {
+      CHECK(timing.period_us == 0.0);
+      continue;
+    }
+    const controller_timing_t& last = timings[k - 1];
+    REQUIRE(timing.seq == last.seq + 1);
+    CHECK(timing.period_us >= last.tick_us - kClockRounding);
+    CHECK(std::abs(timing.period_us - static_cast<double>(timing.utime - last.utime)) <= kStampStep + kClockRounding);
+  }
 }
 
 }  // namespace
@@ -230,6 +259,84 @@ TEST_CASE("InLockstepAUserCommandAndAStopAreTakenWithTheNextState") {
     CHECK(traces[k].user_command_seq == (k < 10 ? 0 : 3));
     CHECK(traces[k].stop_seq == (k < 20 ? 0 : 4));
     CHECK(commands[k].mode == (k < 20 ? 0 : 1));
+  }
+}
+
+TEST_CASE("ATickStampsEachStageItRunsOnceInTheirOrder") {
+  class Recorder final : public StageClock {
+   public:
+    void stamp(Stage stage) noexcept override { stamps.push_back(stage); }
+    std::vector<Stage> stamps;
+  };
+  const std::vector<ByteVector> states = test::recorded_states(test::quiet_stand(), 2, kRun);
+  Ticker ticker(compose(test::biped()));
+  Recorder with_state, without;
+  REQUIRE(ticker.offer_state(states[0]));
+  ticker.tick(1, with_state);
+  ticker.tick(1, without);
+  CHECK(with_state.stamps == std::vector{Stage::kDecode, Stage::kValidate, Stage::kEstimate, Stage::kPlan,
+                                         Stage::kModel, Stage::kForceQp, Stage::kTorque, Stage::kSafety,
+                                         Stage::kEncode});
+  CHECK(without.stamps == std::vector{Stage::kDecode, Stage::kValidate, Stage::kSafety, Stage::kEncode});
+}
+
+TEST_CASE("InLockstepTimingsAddUpAndKnowNoDeadline") {
+  Bench bench;
+  run_lockstep_through(bench, test::recorded_states(test::quiet_stand(), 20, kRun), [](std::size_t) { return true; });
+  while (bench.transport.handle(0)) continue;  // the last tick's
+  const auto timings = bench.all<controller_timing_t>(io::channel::kTiming);
+  REQUIRE(timings.size() == 20);
+  check_timings(timings);
+  for (const controller_timing_t& timing : timings) {
+    CHECK(timing.wake_latency_us == 0.0);
+    CHECK(timing.slack_us == 0.0);
+    CHECK(timing.state_age_us == 0.0);
+    CHECK(timing.missed_ticks == 0);
+    CHECK(timing.dropped_states == 0);
+  }
+}
+
+TEST_CASE("InRealTimeTimingsAddUpAndCountEveryMissedDeadline") {
+  constexpr int num_ticks = 25;  // fewer than LCM queues
+  constexpr int slow_tick = 10;
+  static constexpr auto slowness = 7 * kPeriod / 2;  // three deadlines
+  const std::vector<ByteVector> states = test::recorded_states(test::quiet_stand(), num_ticks + 1, kRun);
+  std::atomic<bool>* stop = nullptr;
+  Bench bench([biped = compose(test::biped()), &stop, ticks = 0](const TickInput& input, StageClock& clock,
+                                                                 TickOutput& output) mutable {
+    biped(input, clock, output);
+    if (++ticks == slow_tick) std::this_thread::sleep_for(slowness);
+    if (ticks == num_ticks) *stop = true;
+  });
+  stop = &bench.stop;
+  const Watchdog watchdog(bench.stop);
+  std::size_t next = 0;
+  const auto send_next = [&] {
+    if (next < states.size()) bench.send_state(states[next++]);
+  };
+  bench.on(io::channel::kRunInfo, [&] {
+    if (next == 0) send_next();
+  });
+  bench.on(io::channel::kTrace, send_next);
+  run_real_time(bench.ticker, bench.transport, bench.run_info, {}, bench.stop);
+  while (bench.transport.handle(0)) continue;  // what was published as the receiver ended
+
+  const auto traces = bench.all<controller_trace_t>(io::channel::kTrace);
+  const auto timings = bench.all<controller_timing_t>(io::channel::kTiming);
+  REQUIRE(traces.size() == num_ticks);
+  REQUIRE(timings.size() == num_ticks);
+  check_timings(timings);
+  std::int64_t missed = 0;
+  for (std::size_t k = 0; k < timings.size(); ++k) {
+    CAPTURE(k);
+    const controller_timing_t& timing = timings[k];
+    CHECK(timing.seq == traces[k].seq);
+    CHECK(timing.slack_us <= 1e6 * kControlPeriod);
+    // A tick that ends past the next deadline misses that and those up to its end; the next one knows how many.
+    CHECK((timing.missed_ticks > missed) == (timing.slack_us < 0.0));
+    if (k + 1 < timings.size()) CHECK(timing.missed_ticks - missed == traces[k + 1].periods - 1);
+    if (k + 1 == slow_tick) CHECK(timing.missed_ticks - missed >= 3);
+    missed = timing.missed_ticks;
   }
 }
 
