@@ -3,7 +3,8 @@
 //
 // Settings that matter: no damping of Bullet's own, gyroscopic term on, exact friction cone, contacts solved to
 // 1e-12 m/s or 50 iterations, no softness, no restitution, never asleep. The joints' ranges are stops of the physics.
-// Legs collide with each other and the trunk.
+// Every body with a collision shape in the URDF meets the ground and the other bodies: of the biped, the trunk and the
+// feet. Its legs have none yet, and pass through one another.
 #include <memory>
 #include <vector>
 

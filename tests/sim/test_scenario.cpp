@@ -41,7 +41,7 @@ TEST_CASE("EveryScenarioOfTheBipedLoads") {
   }
 }
 
-TEST_CASE("TheStandScenarioPushesHalfANewtonSecondForwardAndThreeSideways") {
+TEST_CASE("TheDemoPushesHalfANewtonSecondForwardAndThreeSideways") {
   const Scenario scenario = load_scenario("biped", "demo");
   REQUIRE(scenario.pushes.size() == 2);
   CHECK((scenario.pushes[0].force_W * scenario.pushes[0].duration - Vector3(0.5, 0.0, 0.0)).norm() < 1e-12);
