@@ -3,8 +3,7 @@
 //
 //   gyro             R_WB^T w_WB_W, with white noise, a bias and its random walk
 //   accelerometer    R^T ((v_after - v_before) / dt - g), R half way through the step: the velocity's change, so that
-//   impacts
-//                    are kept; with white noise and a bias, then saturated
+//                    impacts are kept; with white noise and a bias, then saturated
 //   joint velocity   with white noise; joint position with an offset, rounded to the encoder's resolution
 //   contact switch   closed where the ground's normal force passes a threshold
 // IMU and encoders are late by one delay, so that they stay aligned; the switches have their own.

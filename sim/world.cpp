@@ -18,9 +18,8 @@ namespace {
 using rigid_body::Body;
 
 constexpr double kMaxCoordinateVelocity = 1e4;  // rad/s, m/s: Bullet's own clamp of 100 would be felt
-constexpr double kSolvedResidual =
-    1e-24;                            // m^2/s^2: contacts are solved to 1e-12 m/s, mostly in 20 of the 50 iterations
-constexpr double kMaxImpulse = 1e10;  // N s, N m s: likewise
+constexpr double kSolvedResidual = 1e-24;       // m^2/s^2: contacts to 1e-12 m/s, mostly in 20 of the 50 iterations
+constexpr double kMaxImpulse = 1e10;            // N s, N m s: likewise
 
 /// Principal axes of a body's inertia: Bullet takes a diagonal one, in a frame at the centre of mass.
 struct PrincipalAxes {

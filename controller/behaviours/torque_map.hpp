@@ -7,8 +7,9 @@
 // point), f the force of the ground on the foot, tau_gravity what holds the links against gravity.
 //
 // The fourth joint is redundant; the drives keep it, at their own rate, on the posture of the leg's inverse kinematics:
-//   position  q_posture + lead qd_posture        velocity  qd_posture = qd + alpha n,   alpha such that the last link
-//   stays gains     (n^T M n) kp, (n^T M n) kd on the three pitch joints
+//   position   q_posture + lead qd_posture
+//   velocity   qd_posture = qd + alpha n, alpha such that the last link stays
+//   gains      (n^T M n) kp, (n^T M n) kd on the three pitch joints
 // with n the joint motion that leaves the foot where it is, and `lead` the middle of the time that the command is in
 // force. Position and velocity follow the foot's motion, so the gains act along n and hardly on the force. They are
 // scaled by the inertia along n: unscaled they are unstable on light links. The posture keeps the last link's pitch

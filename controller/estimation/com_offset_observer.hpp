@@ -4,8 +4,8 @@
 // of mass that the controller sees, it takes the lean away.
 //
 // Standing, gravity alone turns the robot about the line through the feet's ground points (unit vector a, horizontal):
-//   L' = m g (x + b)      L = a . (L_C + m r x v_C)      r = p_WC - midpoint of the ground points      x = n . r,  n =
-//   a x z
+//   L' = m g (x + b)      L = a . (L_C + m r x v_C)
+//   x = n . r,  n = a x z      r = p_WC - midpoint of the ground points
 // State (L_hat, b), both poles at -w:
 //   e = L - L_hat         L_hat += dt (m g (x + b) + 2 w e)         b += dt w^2 / (m g) e,  |b| <= limit
 #include <array>
