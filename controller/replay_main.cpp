@@ -28,9 +28,9 @@ struct Recording {
   io::RunInfo info;
   bool has_info = false;
   std::map<std::int64_t, io::TraceKey> ticks;
-  std::map<std::int64_t, Payload> traces, commands, plans;          // by tick
-  Named<std::pair<std::int64_t, std::int64_t>> states;              // by run and seq
-  Named<std::int64_t> user_commands, stops;                         // by seq
+  std::map<std::int64_t, Payload> traces, commands, plans;  // by tick
+  Named<std::pair<std::int64_t, std::int64_t>> states;      // by run and seq
+  Named<std::int64_t> user_commands, stops;                 // by seq
 };
 
 template <typename Key>
@@ -115,7 +115,9 @@ Outcome verify(const Recording& recording) {
   loop::Ticker ticker(compose(config::robot_from_texts(recording.info.configuration, recording.info.urdf)));
   loop::NoClock clock;
   std::int64_t expected = 1;
-  for (const auto& [seq, tick] : recording.ticks) {
+  for (const auto& entry : recording.ticks) {
+    const std::int64_t seq = entry.first;
+    const io::TraceKey& tick = entry.second;
     if (seq != expected++) {
       outcome.incomplete = "the log does not hold the trace of tick " + std::to_string(seq - 1);
       break;

@@ -89,7 +89,7 @@ class Simulator {
   ContactVectors planned_forces() const noexcept;
   static Sums no_sums() noexcept;
   void step(Sums& sums);
-  Wrench push_wrench(const rigid_body::State& state, double time) const noexcept;
+  Wrench push_wrench(const rigid_body::State& state, double now) const noexcept;
   bool has_fallen() const noexcept;
   void write_messages(const Sums& sums) noexcept;
 

@@ -8,6 +8,8 @@
 #include <btBulletDynamicsCommon.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "sim/bullet_conversion.hpp"
@@ -69,9 +71,8 @@ struct World::Bullet {
 };
 
 World::World(const WorldSetup& setup) : model_(setup.model), feet_(setup.feet), state_(setup.initial) {
-  std::vector<PrincipalAxes> axes;
-  for (int i = 0; i < model_.num_bodies(); ++i)
-    axes.push_back(principal_axes(model_.bodies[static_cast<std::size_t>(i)]));
+  std::array<PrincipalAxes, rigid_body::kMaxBodies> axes;
+  std::transform(model_.bodies.begin(), model_.bodies.begin() + model_.num_bodies(), axes.begin(), principal_axes);
   R_BI_ = axes[0].R_LI;
   bullet_ = std::make_unique<Bullet>(model_, axes[0].moments, setup.floating);
 

@@ -26,8 +26,8 @@ double finite(const StrictYaml& where, const std::string& key, const YAML::Node&
 
 }  // namespace
 
-StrictYaml::StrictYaml(YAML::Node node, std::string file, std::string path)
-    : node_(std::move(node)), file_(std::move(file)), path_(std::move(path)) {}
+StrictYaml::StrictYaml(const YAML::Node& node, std::string file, std::string path)
+    : node_(node), file_(std::move(file)), path_(std::move(path)) {}
 
 StrictYaml StrictYaml::parse(const std::string& text, const std::string& name) {
   YAML::Node node;

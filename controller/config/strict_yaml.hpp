@@ -44,7 +44,7 @@ class StrictYaml {
   [[noreturn]] void fail(const std::string& key, const std::string& problem) const;
 
  private:
-  StrictYaml(YAML::Node node, std::string file, std::string path);
+  StrictYaml(const YAML::Node& node, std::string file, std::string path);
   YAML::Node require(const std::string& key);
   /// Refuses, here and below, a key that stands twice (yaml-cpp keeps the first and says nothing) or is no name.
   void check_keys() const;

@@ -36,7 +36,7 @@ struct StageData {
 };
 
 struct Problem {
-  explicit Problem(Sizes sizes);  ///< takes all memory
+  explicit Problem(Sizes with);  ///< takes all memory
   Sizes sizes;
   StateVector x0 = StateVector::Zero();
   double friction = 0.0;          ///< mu, of every contact

@@ -2,11 +2,11 @@
 
 #include <sched.h>
 #include <sys/mman.h>
-#include <time.h>
 
 #include <array>
 #include <cerrno>
 #include <cstring>
+#include <ctime>
 
 namespace stance::platform {
 namespace {

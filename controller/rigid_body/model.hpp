@@ -58,7 +58,7 @@ struct Model {
   double total_mass = 0.0;               ///< kg
 
   int num_bodies() const { return num_joints + 1; }
-  int body_index(const std::string& name) const;  ///< throws std::invalid_argument that names the link
+  int body_index(const std::string& link) const;  ///< throws std::invalid_argument that names the link
 };
 
 /// Reads URDF text. Fixed joints are merged into their parents. `joint_order` names every moving joint once. The base
