@@ -5,6 +5,7 @@ PRESET ?= release
 # Two compilers at once need about 3 GB.
 JOBS ?= $(shell nproc)
 PYTHON := .venv/bin/python
+CPP = $$(find controller sim rollout tests -name '*.[ch]pp')
 
 .PHONY: help setup build test demo check check-asan check-tsan check-debug lint bench format lock clean study
 
@@ -32,6 +33,7 @@ demo: build
 check: lint check-debug check-asan check-tsan
 
 lint: setup
+	.venv/bin/clang-format --dry-run -Werror $(CPP)
 	.venv/bin/ruff check analysis tests
 	.venv/bin/ruff format --check analysis tests
 	.venv/bin/mypy
@@ -49,7 +51,7 @@ study: build
 	-.venv/bin/stance study --scenario stand_noisy --scales 1.0 1.05 1.1 --seed 20000
 
 format:
-	clang-format -i $$(git ls-files '*.cpp' '*.hpp')
+	.venv/bin/clang-format -i $(CPP)
 	.venv/bin/ruff format analysis tests
 
 # Resolves setup/python.in anew; needs `uv` and the network.
