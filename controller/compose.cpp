@@ -11,8 +11,8 @@ namespace stance {
 
 loop::TickFunction compose(const config::RobotDescription& robot) {
   if (robot.name == "biped") {
-    auto controller = std::make_shared<behaviours::BipedController>(
-        config::biped_config(robot), robot.model, robot.feet, robot.nominal_joint_position);
+    auto controller = std::make_shared<behaviours::BipedController>(config::biped_config(robot), robot.model,
+                                                                    robot.feet, robot.nominal_joint_position);
     return [controller](const TickInput& input, StageClock& clock, TickOutput& out) {
       controller->step(input, clock, out);
     };

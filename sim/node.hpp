@@ -5,9 +5,9 @@
 // FORCE_PLAN before it. Without an answer the same bytes of the state go out again and again, and silence ends the run.
 // Real time: instants stand on an absolute grid of the monotonic clock. What has arrived by kCommandDeadline after an
 // instant counts as given at it, then the whole period is computed at once; the simulator never waits for a command. So
-// a run whose every command is on time equals the lockstep run, bit for bit. Where the machine stalls, the robot must not
-// fall for it: an instant that is late still leaves kAnswerTime for its answer, and one later than kMaxLateness moves to
-// the grid's next point, with all that follow; simulated time then falls behind the clock by whole periods.
+// a run whose every command is on time equals the lockstep run, bit for bit. Where the machine stalls, the robot must
+// not fall for it: an instant that is late still leaves kAnswerTime for its answer, and one later than kMaxLateness
+// moves to the grid's next point, with all that follow; simulated time then falls behind the clock by whole periods.
 #include <atomic>
 #include <cstdint>
 #include <lcm/lcm-cpp.hpp>
@@ -36,10 +36,10 @@ enum class Ending { kCompleted, kStopped, kSilence };
 /// What became of a run.
 struct NodeReport {
   Ending ending = Ending::kCompleted;
-  std::int64_t times_damped = 0;   ///< times that the drives began to damp for want of a command
-  std::int64_t late_instants = 0;  ///< real time: instants more than kLate behind the grid
+  std::int64_t times_damped = 0;     ///< times that the drives began to damp for want of a command
+  std::int64_t late_instants = 0;    ///< real time: instants more than kLate behind the grid
   std::int64_t slipped_periods = 0;  ///< real time: by which simulated time fell behind the clock
-  double worst_lateness = 0.0;     ///< s
+  double worst_lateness = 0.0;       ///< s
 };
 
 class Node {

@@ -1,6 +1,7 @@
 #pragma once
-// The controller's own model as a plant: one rigid body in Bullet at the robot's centre of mass, with its total mass and
-// standing's inertia (kinematics::standing_inertia). Gravity, the pushes, and the planned forces under its feet act on it.
+// The controller's own model as a plant: one rigid body in Bullet at the robot's centre of mass, with its total mass
+// and standing's inertia (kinematics::standing_inertia). Gravity, the pushes, and the planned forces under its feet act
+// on it.
 //
 // What the sensors see is the robot whose centre of mass is there and whose trunk is turned so: its feet stay where
 // they start, each leg's last link keeps its pitch in W, and the trunk stands where the legs' weight asks it to, at the
@@ -18,8 +19,8 @@ class SingleBody {
   /// `setup` as of the whole robot, with two legs of document 000. Throws std::invalid_argument for another robot.
   explicit SingleBody(const WorldSetup& setup);
 
-  /// One step of kPhysicsStep under the ground's forces `force_W` [N] at the feet's ground points, and the wrench `push`
-  /// about the trunk's origin.
+  /// One step of kPhysicsStep under the ground's forces `force_W` [N] at the feet's ground points, and the wrench
+  /// `push` about the trunk's origin.
   void step(const ContactVectors& force_W, const Wrench& push);
 
   const rigid_body::State& state() const { return state_; }
@@ -37,7 +38,7 @@ class SingleBody {
   rigid_body::Model model_;
   std::array<kinematics::LegGeometry, 2> legs_;
   std::array<double, 2> last_link_pitch_{};  // rad, q1 + q2 + q3 with the trunk upright
-  ContactVectors p_WF_{}, p_WG_{};  // tips of the feet, and the ground points under them
+  ContactVectors p_WF_{}, p_WG_{};           // tips of the feet, and the ground points under them
   World body_;
   rigid_body::State state_;
   ContactVectors foot_force_W_{};

@@ -1,6 +1,6 @@
 #pragma once
-// The plain structs that cross the controller's edge, as the messages of lcmtypes/: fields, frames and units are theirs.
-// Fixed sizes, so that nothing allocates; `num_joints` and `num_contacts` say how much is in use.
+// The plain structs that cross the controller's edge, as the messages of lcmtypes/: fields, frames and units are
+// theirs. Fixed sizes, so that nothing allocates; `num_joints` and `num_contacts` say how much is in use.
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>

@@ -10,7 +10,7 @@
 namespace stance::loop {
 
 struct RealTimeConfig {
-  double phase = 0.001;      ///< s, from a state's stamp to the tick that takes it
+  double phase = 0.001;       ///< s, from a state's stamp to the tick that takes it
   double state_wait = 0.004;  ///< s, that a tick waits for a state that is late
 };
 

@@ -170,8 +170,7 @@ void centroidal(const Model& model, const Kinematics& kinematics, Centroidal& ou
   }
 }
 
-void centroidal_momentum_matrix(const Model& model, const Kinematics& kinematics,
-                                Matrix6Nu& A_G) noexcept {
+void centroidal_momentum_matrix(const Model& model, const Kinematics& kinematics, Matrix6Nu& A_G) noexcept {
   const std::array<CompositeInertia, kMaxBodies> composite = composite_inertias(model, kinematics);
   momentum_matrix(model, kinematics, composite, A_G);
   // From about B's origin to about C: L_C = L_B - p_BC x p.

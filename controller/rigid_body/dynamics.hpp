@@ -73,8 +73,7 @@ struct Centroidal {
 void centroidal(const Model& model, const Kinematics& kinematics, Centroidal& out) noexcept;
 
 /// Centroidal momentum matrix: (L_C_W, m v_WC) = A_G nu. Shape 6 x (6 + n).
-void centroidal_momentum_matrix(const Model& model, const Kinematics& kinematics,
-                                Matrix6Nu& A_G) noexcept;
+void centroidal_momentum_matrix(const Model& model, const Kinematics& kinematics, Matrix6Nu& A_G) noexcept;
 
 /// Rows of linear constraints on nu.
 inline constexpr int kMaxConstraintRows = 6 + kMaxJoints;

@@ -102,8 +102,7 @@ TEST_CASE("AnyKeyOfTheControllersSectionThatIsMissingIsNamed") {
   CHECK(removed > 50);
   YAML::Node root = YAML::Load(biped().yaml_text);
   root.remove("controller");
-  CHECK_THROWS_MATCHES(biped_config_of(YAML::Dump(root)), ConfigError,
-                       Message("biped.yaml: controller is missing"));
+  CHECK_THROWS_MATCHES(biped_config_of(YAML::Dump(root)), ConfigError, Message("biped.yaml: controller is missing"));
 }
 
 TEST_CASE("AnUnknownKeyInAnyMappingOfTheControllersSectionIsNamed") {
@@ -184,8 +183,7 @@ TEST_CASE("AValueOutOfRangeIsRefusedByItsName") {
   };
   for (const Case& c : cases) {
     CAPTURE(c.path, c.value);
-    CHECK_THROWS_MATCHES(biped_config_of(biped_yaml_with(std::string("controller.") + c.path, c.value)),
-                         ConfigError,
+    CHECK_THROWS_MATCHES(biped_config_of(biped_yaml_with(std::string("controller.") + c.path, c.value)), ConfigError,
                          MessageMatches(ContainsSubstring("biped.yaml: controller: ") && ContainsSubstring(c.named)));
   }
 }

@@ -48,10 +48,9 @@ Matrix3 effective_by_differences(const Biped& biped, const State& state, const s
         kinematics::LegVector q;
         // The last link keeps its pitch in W: its angle in the leg takes the trunk's turn back.
         const double q0 = state.q(4 * leg);
-        const double pitch = state.q.segment<3>(4 * leg + 1).sum() -
-                             Vector3(0.0, std::cos(q0), std::sin(q0)).dot(angle_B);
-        REQUIRE(kinematics::leg_ik(biped.legs[leg], p_LF, pitch, q) ==
-                kinematics::LegIkStatus::kOk);
+        const double pitch =
+            state.q.segment<3>(4 * leg + 1).sum() - Vector3(0.0, std::cos(q0), std::sin(q0)).dot(angle_B);
+        REQUIRE(kinematics::leg_ik(biped.legs[leg], p_LF, pitch, q) == kinematics::LegIkStatus::kOk);
         out.q.segment<4>(4 * leg) = q;
       }
       Centroidal c;

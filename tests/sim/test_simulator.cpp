@@ -327,8 +327,9 @@ TEST_CASE("MassFactorsChangeThePlantAndNotTheDescription") {
 namespace {
 
 // Error of one tick of the centroidal model over dt^2: (roll pitch yaw, p_WC, omega, v_WC), each in its unit per s^2.
-// Angles: half the angular acceleration, 45 rad/s^2 at most. Position: half the acceleration. Angular velocity: half the moment's rate over
-// the inertia, as C moves past the feet at 0.1-0.2 m/s under 130 N. Velocity: the forces are constant, only rounding.
+// Angles: half the angular acceleration, 45 rad/s^2 at most. Position: half the acceleration. Angular velocity: half
+// the moment's rate over the inertia, as C moves past the feet at 0.1-0.2 m/s under 130 N. Velocity: the forces are
+// constant, only rounding.
 constexpr double kTickTolerance[] = {30.0, 2.0, 100.0, 1e-6};
 
 struct TickCase {
@@ -368,7 +369,8 @@ centroidal::StateVector predict(const TickCase& tick, double dt, const centroida
   at.dt = dt;
   at.yaw = tick.yaw;
   at.num_contacts = 2;
-  for (std::size_t foot = 0; foot < 2; ++foot) at.r[foot] = p_WF[foot] - Vector3(0.0, 0.0, robot.feet[foot].radius) - x.segment<3>(3);
+  for (std::size_t foot = 0; foot < 2; ++foot)
+    at.r[foot] = p_WF[foot] - Vector3(0.0, 0.0, robot.feet[foot].radius) - x.segment<3>(3);
   centroidal::Dynamics model;
   const Matrix3 inertia = kinematics::standing_inertia(robot.model, robot.feet, robot.nominal_joint_position);
   centroidal::dynamics({whole.mass, inertia}, at, model);
