@@ -133,6 +133,7 @@ class ForceQp:
     primal_residual_max: float
     """N"""
     dual_residual_max: float
+    """N, of the projected gradient"""
     active_max: int
     effort_mean: float
     """||f||_R"""

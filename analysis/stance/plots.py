@@ -515,7 +515,7 @@ def force_qp(run: Run) -> Figure:
     floor = 1e-16
     for name, label, colour in (
         ("qp_primal_residual", "primal [N]", style.TRUTH),
-        ("qp_dual_residual", "dual, scaled", style.ESTIMATE),
+        ("qp_dual_residual", "dual [N]", style.ESTIMATE),
     ):
         axes[2].plot(time, np.maximum(where_ran(name), floor), ".", color=colour, ms=2.5, label=label)
     axes[2].set_yscale("log")

@@ -218,7 +218,7 @@ def _force_qp(metrics: Metrics) -> list[list[str]]:
     if qp.iterations is not None:
         rows.append(["iterations, p50 / p99 / max", " / ".join(f"{value:.0f}" for value in _three(qp.iterations))])
     rows.append(["primal residual, largest", f"{qp.primal_residual_max:.2e} N"])
-    rows.append(["dual residual, largest", f"{qp.dual_residual_max:.2e}"])
+    rows.append(["dual residual, largest", f"{qp.dual_residual_max:.2e} N"])
     rows.append(["active constraints, most", f"{qp.active_max}"])
     rows.append(["effort ‖f‖_R, mean / largest", f"{qp.effort_mean:.2f} / {qp.effort_max:.2f}"])
     return rows
