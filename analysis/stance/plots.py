@@ -100,7 +100,7 @@ def _run_facts(run: Run, measured: Metrics) -> list[tuple[str, str]]:
         facts.append(("clock", "lockstep" if found.slip is None else f"real time, {found.slip:.2f} s lost to stalls"))
         facts.append(("ticks", f"{found.count}, missed {found.missed}, without a new state {found.without_new_state}"))
         for miss in found.misses[:4]:
-            facts.append(("", f"{miss.ticks} at {miss.at:.2f} s: {miss.cause}"))
+            facts.append(("", f"{miss.ticks} at {miss.at:.2f} s: {miss.cause.partition(':')[0]}"))
         if len(found.misses) > 4:
             facts.append(("", f"and {len(found.misses) - 4} more times"))
     if measured.timing is not None and measured.timing.tick_us is not None:
@@ -510,7 +510,7 @@ def force_qp(run: Run) -> Figure:
     axes[1].plot(time, where_ran("qp_iterations"), ".", color=style.TRUTH, ms=2.5)
     axes[1].set_title("Iterations")
     axes[1].set_ylabel("iterations")
-    axes[1].set_ylim(0.0, None)
+    axes[1].set_ylim(0.0, max(4.0, axes[1].get_ylim()[1]))
     axes[1].yaxis.set_major_locator(MaxNLocator(integer=True, nbins=5))
     floor = 1e-16
     for name, label, colour in (
