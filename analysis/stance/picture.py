@@ -17,7 +17,7 @@ from scipy.spatial import ConvexHull
 from . import configuration, metrics, style
 from .errors import UnreadableError
 from .metrics import Push
-from .series import Array, Floats, Run
+from .series import Array, Floats, Integers, Run
 from .style import new_figure, styled
 from .urdf import Robot, Shape, rotation_from_quaternion, transform
 
@@ -56,11 +56,26 @@ class Pose:
     """rad"""
 
 
-def pose_at(run: Run, time: float) -> Pose:
-    """The logged instant nearest to `time` [s]. Raises UnreadableError where the log has no TRUTH."""
+def _whole(run: Run) -> Integers:
+    """Rows of TRUTH whose pose and forces are all finite: those that can be drawn."""
     if "TRUTH" not in run:
+        return np.empty(0, np.int64)
+    names = ("p_WB", "quat_WB", "joint_position", "p_WF", "f_F_W", "push_W")
+    finite = [np.isfinite(run.field("TRUTH", name)).reshape(run.count("TRUTH"), -1).all(axis=1) for name in names]
+    return np.flatnonzero(np.all(finite, axis=0))
+
+
+def drawable(run: Run) -> bool:
+    """Whether the log has a TRUTH to draw, and the body's URDF."""
+    return len(_whole(run)) > 0 and configuration.robot(run) is not None
+
+
+def pose_at(run: Run, time: float) -> Pose:
+    """The logged instant nearest to `time` [s] that is finite. Raises UnreadableError where there is none."""
+    rows = _whole(run)
+    if not len(rows):
         raise UnreadableError("no TRUTH in the log: the robot cannot be drawn")
-    row = int(np.argmin(np.abs(run.time("TRUTH") - time)))
+    row = int(rows[np.argmin(np.abs(run.time("TRUTH")[rows] - time))])
     contacts, joints = metrics.num_contacts(run), metrics.num_joints(run)
 
     def at(name: str) -> Array:
@@ -148,12 +163,13 @@ def _instants_of(run: Run, push: Push) -> list[float]:
     """Before a push, within it, at its end, at the largest tilt after it, and back again [s]; a fall ends them."""
     time = run.time("TRUTH")
     end = push.start + push.duration
-    after = np.flatnonzero((time >= end + MIN_STEP) & (time <= end + 1.0))
+    rows = _whole(run)
+    after = rows[(time[rows] >= end + MIN_STEP) & (time[rows] <= end + 1.0)]
     wanted = [push.start - 0.02, push.start + 0.5 * push.duration, end]
     if len(after):
         tilt = metrics.tilt(run.field("TRUTH", "quat_WB")[after])
         peak = float(time[after[np.argmax(tilt)]])
-        wanted += [peak, min(peak + 1.0, float(time[-1]))]
+        wanted += [peak, min(peak + 1.0, float(time[rows[-1]]))]
     return [one for before, one in zip([-np.inf, *wanted], wanted, strict=False) if one > before]
 
 

@@ -14,7 +14,7 @@ from matplotlib.ticker import MaxNLocator
 from . import configuration, metrics, style
 from .check import Verdict
 from .metrics import Metrics, Percentiles
-from .picture import picture
+from .picture import drawable, picture
 from .plain import counted
 from .series import Array, Floats, Run
 from .style import new_figure, shade, styled, time_axis
@@ -543,7 +543,7 @@ class Plot:
 
 
 PLOTS = {
-    "picture": Plot("The robot", picture, lambda run: "TRUTH" in run and configuration.robot(run) is not None),
+    "picture": Plot("The robot", picture, drawable),
     "timing": Plot("Tick period and stage times", timing, lambda run: "CONTROLLER_TIMING" in run),
     "center_of_mass": Plot("Centre of mass and base", center_of_mass, lambda run: "CONTROLLER_TRACE" in run),
     "forces": Plot(

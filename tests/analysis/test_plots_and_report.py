@@ -36,7 +36,24 @@ def without_truth() -> Run:
     return run_of({name: values for name, values in Synthetic(duration=0.5).messages().items() if name != "TRUTH"})
 
 
-RENDERED = ("stand", "fall", "one state")  # the others are drawn up to their layout: it is what takes the time
+RENDERED = (
+    "stand",
+    "fall",
+    "one state",
+    "diverged",
+)  # the others are drawn up to their layout: it is what takes the time
+
+
+def diverged(after: int) -> Run:
+    """Nothing that is finite from one row on."""
+    messages = Synthetic(duration=0.6, pushes=[(0.2, 0.1, (5.0, 0.0, 0.0))]).messages()
+    for channel in ("TRUTH", "FORCE_PLAN", "CONTROLLER_TRACE"):
+        for name in messages[channel].dtype.names or ():
+            if messages[channel].dtype[name].base.kind == "f":
+                messages[channel][name][after:] = np.nan
+    return run_of(messages)
+
+
 KINDS = {
     "stand": lambda: Log.from_bytes(Synthetic(duration=3.0).log()).run(),
     "fall": lambda: Log.from_bytes(Synthetic(duration=3.0, fall_at=1.0, qp_failures=(5, 6), refused=3).log()).run(),
@@ -44,6 +61,8 @@ KINDS = {
     "lockstep": lambda: Log.from_bytes(Synthetic(duration=1.0, realtime=False).log()).run(),
     "states alone": lonely,
     "no truth": without_truth,
+    "diverged": lambda: diverged(35),
+    "never finite": lambda: diverged(0),
     "one state": lambda: run_of({"ROBOT_STATE": ticked("robot_state_t", 1)}),
     "a part": lambda: Log.from_bytes(Synthetic(duration=3.0).log()).run().between(1.4, 1.9),
 }
