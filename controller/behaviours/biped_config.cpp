@@ -37,6 +37,30 @@ void BipedConfig::validate() const {
   require(highest >= 0.0, "stand.height_offset_range's greatest", highest, ">= 0 m");
   require(torque_map.null_space_kp >= 0.0, "torque_map.null_space_kp", torque_map.null_space_kp, ">= 0");
   require(torque_map.null_space_kd >= 0.0, "torque_map.null_space_kd", torque_map.null_space_kd, ">= 0");
+  walk.horizon.validate();
+  walk.gait.validate();
+  walk.velocity.validate();
+  require(walk.horizon.num_stages() <= kMaxPlanStages, "walk.horizon's stages", walk.horizon.num_stages(),
+          ("<= " + std::to_string(kMaxPlanStages)).c_str());
+  require(walk.friction > 0.0, "walk.friction", walk.friction, "> 0");
+  require(walk.state_weights.minCoeff() >= 0.0, "walk.state_weights' least", walk.state_weights.minCoeff(), ">= 0");
+  require(walk.recovery_weights.minCoeff() >= 0.0, "walk.recovery_weights' least", walk.recovery_weights.minCoeff(),
+          ">= 0");
+  require(walk.force_weight > 0.0, "walk.force_weight", walk.force_weight, "> 0");
+  require(walk.height_integral_gain >= 0.0, "walk.height_integral_gain", walk.height_integral_gain, ">= 0");
+  require(walk.height_integral_limit >= 0.0, "walk.height_integral_limit", walk.height_integral_limit, ">= 0 m");
+  require(walk.height_offset_rate > 0.0, "walk.height_offset_rate", walk.height_offset_rate, "> 0 m/s");
+  require(stepping.capture.minCoeff() > 0.0, "stepping.capture's least", stepping.capture.minCoeff(), "> 0 m");
+  require(stepping.capture_pitch > 0.0, "stepping.capture_pitch", stepping.capture_pitch, "> 0 rad");
+  require(stepping.min_steps >= 1, "stepping.min_steps", stepping.min_steps, ">= 1");
+  require(stepping.settled.minCoeff() > 0.0, "stepping.settled's least", stepping.settled.minCoeff(), "> 0 m");
+  require(stepping.settled_feet > 0.0, "stepping.settled_feet", stepping.settled_feet, "> 0 m");
+  require(stepping.settled_pitch > 0.0, "stepping.settled_pitch", stepping.settled_pitch, "> 0 rad");
+  require(torque_map.swing_kp >= 0.0, "torque_map.swing_kp", torque_map.swing_kp, ">= 0");
+  require(torque_map.swing_kd >= 0.0, "torque_map.swing_kd", torque_map.swing_kd, ">= 0");
+  require(torque_map.swing_lead >= 0.0 && torque_map.swing_lead < 0.05, "torque_map.swing_lead", torque_map.swing_lead,
+          "in 0..0.05 s");
+  require(torque_map.max_ankle > 0.0, "torque_map.max_ankle", torque_map.max_ankle, "> 0 m");
   require(torque_map.lead >= 0.0 && torque_map.lead < 0.05, "torque_map.lead", torque_map.lead, "in 0..0.05 s");
   require(com_offset_quiet_momentum > 0.0, "com_offset_observer.quiet_momentum", com_offset_quiet_momentum, "> 0");
 }

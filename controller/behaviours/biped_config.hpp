@@ -4,6 +4,8 @@
 #include "controller/estimation/com_offset_observer.hpp"
 #include "controller/force_qp/force_qp.hpp"
 #include "controller/kinematics/fallen.hpp"
+#include "controller/planning/horizon.hpp"
+#include "controller/planning/velocity.hpp"
 #include "controller/safety/fault_ladder.hpp"
 #include "controller/safety/validation.hpp"
 
@@ -25,10 +27,37 @@ struct StandConfig {
   std::array<double, 2> height_offset_range{};              ///< m, that an operator may ask for
 };
 
+struct WalkConfig {
+  planning::HorizonConfig horizon;
+  planning::GaitConfig gait;
+  planning::VelocityConfig velocity;
+  double friction = 0.0;                                       ///< mu of the planned forces
+  CentroidalState state_weights = CentroidalState::Zero();     ///< Q's diagonal, per control period
+  CentroidalState recovery_weights = CentroidalState::Zero();  ///< the same while recovering
+  double force_weight = 0.0;                                   ///< R's diagonal, per control period
+  double height_integral_gain = 0.0;                           ///< 1/s
+  double height_integral_limit = 0.0;                          ///< m
+  double height_offset_rate = 0.0;                             ///< m/s
+};
+
+/// When a standing robot takes a step, and when a stepping one stands again.
+struct SteppingConfig {
+  planning::Vector2 capture = planning::Vector2::Zero();  ///< m, of xi from the feet's middle, in H, above which it steps
+  double capture_pitch = 0.0;                             ///< rad, of the trunk, the same
+  int min_steps = 0;                                      ///< before it may stand again
+  planning::Vector2 settled = planning::Vector2::Zero();  ///< m, of xi from the feet's middle, below which it may
+  double settled_feet = 0.0;                              ///< m, fore and aft between the feet, the same
+  double settled_pitch = 0.0;                             ///< rad, the same
+};
+
 struct TorqueMapConfig {
   double null_space_kp = 0.0;  ///< 1/s^2
   double null_space_kd = 0.0;  ///< 1/s
   double lead = 0.0;           ///< s, from the state to the middle of its command's effect
+  double swing_kp = 0.0;       ///< 1/s^2, of the swing leg's joints
+  double swing_kd = 0.0;       ///< 1/s
+  double swing_lead = 0.0;     ///< s, the same as lead
+  double max_ankle = 0.0;      ///< m, from the hip's pitch axis to where the last link begins, above which that link stretches
 };
 
 struct BipedConfig {
@@ -39,6 +68,8 @@ struct BipedConfig {
   force_qp::Settings force_qp;
   ForceLimits force_limits;
   StandConfig stand;
+  WalkConfig walk;
+  SteppingConfig stepping;
   TorqueMapConfig torque_map;
   safety::FaultLadderConfig fault_ladder;
   safety::ValidationConfig validation;

@@ -21,7 +21,6 @@ std::array<rigid_body::Foot, 2> two_feet(const std::vector<rigid_body::Foot>& fe
 struct Nominal {
   double height = 0.0;       ///< m, C over the ground
   std::array<Vector3, 2> r;  ///< m, from C to the ground points
-  Matrix3 inertia;           ///< kg m^2, I_eff, diagonal
 };
 
 Nominal nominal_posture(const rigid_body::Model& model, const std::array<rigid_body::Foot, 2>& feet,
@@ -39,7 +38,6 @@ Nominal nominal_posture(const rigid_body::Model& model, const std::array<rigid_b
     nominal.r[i] = p_WF - Vector3(0.0, 0.0, feet[i].radius) - centroidal.p_WC;
   }
   nominal.height = -0.5 * (nominal.r[0].z() + nominal.r[1].z());
-  nominal.inertia = kinematics::standing_inertia(model, feet, q);
   return nominal;
 }
 
@@ -62,9 +60,12 @@ BipedController::BipedController(const BipedConfig& config, const rigid_body::Mo
       stand_([&] {
         config.validate();
         const Nominal nominal = nominal_posture(model_, feet_, nominal_joint_position);
-        return Stand(config.stand, config.force_limits, config.force_qp, model_.total_mass, nominal.inertia, nominal.r,
-                     nominal.height);
-      }()) {
+        return Stand(config.stand, config.force_limits, config.force_qp, model_.total_mass,
+                     kinematics::standing_inertia(model_, feet_, nominal_joint_position), nominal.r, nominal.height);
+      }()),
+      walk_(config.walk, config.force_limits, config.force_qp, model_.total_mass,
+            kinematics::stepping_inertia(model_, feet_, nominal_joint_position),
+            nominal_posture(model_, feet_, nominal_joint_position).height, legs_[0].p_BL.y(), feet_[0].radius) {
   start_run(0);
 }
 
@@ -91,15 +92,18 @@ void BipedController::step(const TickInput& input, StageClock& clock, TickOutput
   if (fresh) {
     estimate(input.state, trace.estimate);
     clock.stamp(Stage::kEstimate);
-    plan(input.periods, trace);
+    plan(input.periods, input.state, trace);
     clock.stamp(Stage::kPlan);
-    stand_.model();
+    memory_.stepping ? walk_.model() : stand_.model();
     clock.stamp(Stage::kModel);
     // Where it fails, the last plan's forces stay.
-    if (!ladder_.latched() && stand_.solve(out.plan, trace) != QpStatus::kSolved) ladder_.report(Fault::kQpFailed);
+    if (!ladder_.latched()) {
+      const QpStatus status = memory_.stepping ? walk_.solve(out.plan, trace) : stand_.solve(out.plan, trace);
+      if (status != QpStatus::kSolved) ladder_.report(Fault::kQpFailed);
+    }
     clock.stamp(Stage::kForceQp);
     if (has_plan(out)) {
-      torque_map_.stance(body_, out.plan.force.front(), out.command);
+      torque_map_.map(body_, leg_tasks(out.plan), out.command);
       trace.torques_clipped = safety::limit_torques(model_, out.command);
       if (trace.torques_clipped > 0) ladder_.report(Fault::kTorqueSaturated);
     }
@@ -122,7 +126,7 @@ bool BipedController::accept(const TickInput& input) noexcept {
 
   const UserCommand& command = input.user_command;
   if (command.seq != memory_.user_command.seq) {
-    const bool offered = command.behaviour == Behaviour::kStand &&
+    const bool offered = (command.behaviour == Behaviour::kStand || command.behaviour == Behaviour::kWalk) &&
                          command.height_offset >= config_.stand.height_offset_range[0] &&
                          command.height_offset <= config_.stand.height_offset_range[1];
     if (safety::command_is_plausible(command) && offered) {
@@ -158,7 +162,7 @@ bool BipedController::follows(const RobotState& state) const noexcept {
 
 void BipedController::estimate(const RobotState& state, BaseEstimate& base) noexcept {
   if (!estimator_.initialised()) estimator_.initialise(state);
-  estimator_.step(state, {}, base);
+  estimator_.step(state, contact_plan(), base);
 
   body_.state = {base.p_WB, base.R_WB, base.v_WB, base.w_WB_W, state.now().joint_position, state.now().joint_velocity};
   rigid_body::forward_kinematics(model_, body_.state, body_.kinematics);
@@ -171,37 +175,107 @@ void BipedController::estimate(const RobotState& state, BaseEstimate& base) noex
   }
 }
 
-void BipedController::plan(int periods, Trace& trace) noexcept {
+estimation::ContactPlan BipedController::contact_plan() const noexcept {
+  estimation::ContactPlan plan;
+  if (!memory_.stepping) return plan;
+  for (std::size_t i = 0; i < kFeet; ++i) {
+    plan.stance[i] = walk_.gait().state().stance(static_cast<int>(i));
+    plan.load[i] = walk_.gait().state().load(static_cast<int>(i));
+  }
+  return plan;
+}
+
+void BipedController::plan(int periods, const RobotState& state, Trace& trace) noexcept {
   const BaseEstimate& base = trace.estimate;
-  StandInput where;
-  where.rpy = math::rpy_from_rotation(base.R_WB);
-  where.rpy.z() = math::unwrap(where.rpy.z(), memory_.yaw);
-  memory_.yaw = where.rpy.z();
+  WalkInput now;
+  now.rpy = math::rpy_from_rotation(base.R_WB);
+  now.rpy.z() = math::unwrap(now.rpy.z(), memory_.yaw);
+  memory_.yaw = now.rpy.z();
+  now.p_WF = {base.p_WF[0], base.p_WF[1]};
+  now.v_WC = body_.centroidal.v_WC;
+  now.w_WB_W = base.w_WB_W;
+  now.contact_switch = {state.now().contact_switch[0], state.now().contact_switch[1]};
+  now.velocity = memory_.user_command.velocity;
+  now.yaw_rate = memory_.user_command.yaw_rate;
+  now.height_offset = memory_.user_command.height_offset;
+  now.periods = periods;
+
+  estimation::CentreOfMassOffsetInput seen;
+  seen.p_WC = body_.centroidal.p_WC;
+  seen.v_WC = now.v_WC;
+  seen.L_C_W = body_.centroidal.L_C_W;
+  seen.p_WF = now.p_WF;
+  seen.yaw = memory_.yaw;
+  // A push turns the robot about its feet as an offset would: look only while the robot is quiet.
+  seen.standing = !memory_.stepping && base.contact[0] && base.contact[1] &&
+                  body_.centroidal.L_C_W.head<2>().norm() < config_.com_offset_quiet_momentum;
+  now.p_WC = seen.p_WC + observer_.step(seen, std::min(kControlPeriod * periods, kMaxObserverStep));
+
+  choose_behaviour(now);
+  TickState reference;
+  if (memory_.stepping) {
+    walk_.plan(now, reference);
+  } else {
+    stand(now, reference);
+  }
+  trace.behaviour = memory_.stepping ? Behaviour::kWalk : Behaviour::kStand;
+  trace.x = reference.x;
+  trace.x_ref = reference.x_ref;
+}
+
+void BipedController::stand(const WalkInput& now, TickState& reference) noexcept {
   // A stance that was given up (damped) is taken up anew.
   if (!memory_.standing || ladder_.mode() == SafetyMode::kDamp) stand_.enter();
   memory_.standing = true;
-
-  const Vector3 radius(0.0, 0.0, feet_[0].radius);
-  for (std::size_t i = 0; i < kFeet; ++i) where.p_WG[i] = base.p_WF[i] - radius;
-  where.v_WC = body_.centroidal.v_WC;
+  StandInput where;
+  where.rpy = now.rpy;
+  where.p_WC = now.p_WC;
+  where.v_WC = now.v_WC;
   where.L_C_W = body_.centroidal.L_C_W;
-  estimation::CentreOfMassOffsetInput seen;
-  seen.p_WC = body_.centroidal.p_WC;
-  seen.v_WC = where.v_WC;
-  seen.L_C_W = where.L_C_W;
-  seen.p_WF = {base.p_WF[0], base.p_WF[1]};
-  seen.yaw = memory_.yaw;
-  // A push turns the robot about its feet as an offset would: look only while the robot is quiet.
-  seen.standing =
-      base.contact[0] && base.contact[1] && body_.centroidal.L_C_W.head<2>().norm() < config_.com_offset_quiet_momentum;
-  where.p_WC = seen.p_WC + observer_.step(seen, std::min(kControlPeriod * periods, kMaxObserverStep));
-  where.height_offset = memory_.user_command.height_offset;
-  where.periods = periods;
-  StandOutput reference;
+  const Vector3 radius(0.0, 0.0, feet_[0].radius);
+  for (std::size_t i = 0; i < kFeet; ++i) where.p_WG[i] = now.p_WF[i] - radius;
+  where.height_offset = now.height_offset;
+  where.periods = now.periods;
   stand_.plan(where, reference);
-  trace.behaviour = Behaviour::kStand;
-  trace.x = reference.x;
-  trace.x_ref = reference.x_ref;
+}
+
+void BipedController::choose_behaviour(const WalkInput& now) noexcept {
+  const SteppingConfig& c = config_.stepping;
+  const double cosine = std::cos(now.rpy.z()), sine = std::sin(now.rpy.z());
+  const auto in_heading = [&](const Vector3& v) {
+    return Vector2(cosine * v.x() + sine * v.y(), -sine * v.x() + cosine * v.y());
+  };
+  // The divergent component of motion from the middle of the feet, and the feet from each other.
+  const Vector2 xi =
+      in_heading(now.p_WC + now.v_WC / walk_.gait().omega() - 0.5 * (now.p_WF[0] + now.p_WF[1]));
+  const bool wanted = memory_.user_command.behaviour == Behaviour::kWalk;
+  if (!memory_.stepping) {
+    const bool pushed = std::abs(xi.x()) > c.capture.x() || std::abs(xi.y()) > c.capture.y() ||
+                        std::abs(now.rpy.y()) > c.capture_pitch;
+    if (!wanted && !pushed) return;
+    const planning::GaitConfig& gait = config_.walk.gait;
+    // The foot that the robot leans away from lifts.
+    walk_.enter(now, xi.y() < 0.0 ? 0 : 1, pushed ? gait.capture_double_support : gait.first_double_support);
+    memory_.stepping = true;
+    memory_.standing = false;
+    return;
+  }
+  const planning::GaitState& gait = walk_.gait().state();
+  const double apart = in_heading(now.p_WF[0] - now.p_WF[1]).x();
+  const bool settled = gait.phase == planning::GaitPhase::kDoubleSupport && gait.steps >= c.min_steps &&
+                       std::abs(xi.x()) < c.settled.x() && std::abs(xi.y()) < c.settled.y() &&
+                       std::abs(apart) < c.settled_feet && std::abs(now.rpy.y()) < c.settled_pitch;
+  if (!wanted && settled) memory_.stepping = false;
+}
+
+std::array<LegTask, BipedController::kFeet> BipedController::leg_tasks(const ForcePlan& plan) const noexcept {
+  std::array<LegTask, kFeet> tasks;
+  for (std::size_t i = 0; i < kFeet; ++i) {
+    tasks[i].stance = !memory_.stepping || walk_.gait().state().stance(static_cast<int>(i));
+    tasks[i].force_W = plan.force.front()[i];
+    tasks[i].swing = walk_.gait().swing();
+  }
+  return tasks;
 }
 
 void BipedController::give_up(SafetyMode mode, TickOutput& out) const noexcept {

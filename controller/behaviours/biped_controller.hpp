@@ -5,6 +5,7 @@
 #include "controller/behaviours/biped_config.hpp"
 #include "controller/behaviours/stand.hpp"
 #include "controller/behaviours/torque_map.hpp"
+#include "controller/behaviours/walk.hpp"
 #include "controller/estimation/base_estimator.hpp"
 #include "controller/estimation/com_offset_observer.hpp"
 #include "controller/safety/fault_ladder.hpp"
@@ -33,14 +34,20 @@ class BipedController {
     std::int64_t state_utime = -1;  ///< us
     UserCommand user_command;       ///< last plausible one
     double yaw = 0.0;               ///< rad, unwrapped
-    bool standing = false;
+    bool standing = false;          ///< the stance has been taken up
+    bool stepping = false;
     TickOutput last;  ///< what HOLD repeats
   };
 
   void start_run(std::int64_t run_id) noexcept;
   bool accept(const TickInput& input) noexcept;
   void estimate(const RobotState& state, BaseEstimate& base) noexcept;
-  void plan(int periods, Trace& trace) noexcept;
+  void plan(int periods, const RobotState& state, Trace& trace) noexcept;
+  void stand(const WalkInput& now, TickState& reference) noexcept;
+  /// From standing to stepping and back.
+  void choose_behaviour(const WalkInput& now) noexcept;
+  std::array<LegTask, kFeet> leg_tasks(const ForcePlan& plan) const noexcept;
+  estimation::ContactPlan contact_plan() const noexcept;
   bool follows(const RobotState& state) const noexcept;
   /// No forces: what the robot is commanded in DAMP and STOP.
   void give_up(SafetyMode mode, TickOutput& out) const noexcept;
@@ -59,6 +66,7 @@ class BipedController {
   BodyDynamics body_;
   TorqueMap torque_map_;
   Stand stand_;
+  Walk walk_;
 };
 
 }  // namespace stance::behaviours

@@ -56,7 +56,7 @@ void Stand::enter() noexcept {
   qp_->reset();
 }
 
-void Stand::plan(const StandInput& input, StandOutput& out) noexcept {
+void Stand::plan(const StandInput& input, TickState& out) noexcept {
   const double dt = std::min(kControlPeriod * input.periods, kMaxStep);
   const double offset_step = config_.height_offset_rate * dt;
   height_offset_ += std::clamp(input.height_offset - height_offset_, -offset_step, offset_step);
@@ -99,12 +99,7 @@ void Stand::model() noexcept {
 
 QpStatus Stand::solve(ForcePlan& plan, Trace& trace) noexcept {
   const QpStatus status = qp_->solve(problem_, solution_);
-  trace.qp_engine = solution_.engine;
-  trace.qp_status = status;
-  trace.qp_iterations = solution_.iterations;
-  trace.qp_primal_residual = solution_.primal_residual;
-  trace.qp_dual_residual = solution_.dual_residual;
-  trace.qp_active = solution_.active;
+  note(solution_, trace);
   if (status != QpStatus::kSolved) return status;
 
   plan.num_contacts = kFeet;

@@ -10,6 +10,7 @@
 #include <memory>
 
 #include "controller/behaviours/biped_config.hpp"
+#include "controller/behaviours/tick.hpp"
 #include "controller/centroidal/centroidal.hpp"
 
 namespace stance::behaviours {
@@ -25,11 +26,6 @@ struct StandInput {
   int periods = 1;                               ///< control periods since the last call
 };
 
-struct StandOutput {
-  CentroidalState x = CentroidalState::Zero();      ///< in W
-  CentroidalState x_ref = CentroidalState::Zero();  ///< in W
-};
-
 class Stand {
  public:
   /// `nominal_height` [m]: of C over the ground; `inertia` [kg m^2]: I_eff in H. Throws std::invalid_argument.
@@ -40,7 +36,7 @@ class Stand {
   void enter() noexcept;
 
   /// The reference, x and the linear model of this tick.
-  void plan(const StandInput& input, StandOutput& out) noexcept;
+  void plan(const StandInput& input, TickState& out) noexcept;
   void model() noexcept;
   /// Solves; where the status is kSolved, `plan` has the forces in W and the predicted path.
   QpStatus solve(ForcePlan& plan, Trace& trace) noexcept;

@@ -1,5 +1,7 @@
 #include "controller/behaviours/torque_map.hpp"
 
+#include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 namespace stance::behaviours {
@@ -7,51 +9,110 @@ namespace {
 
 constexpr double kMinNullSum = 1e-2;  // below it the last link's angle cannot be kept by moving along n
 
+Vector3 pitch_axis_B(double q0) noexcept { return {0.0, std::cos(q0), std::sin(q0)}; }
+
 }  // namespace
 
 TorqueMap::TorqueMap(const TorqueMapConfig& config, double last_link_pitch, const rigid_body::Model& model,
                      const std::array<rigid_body::Foot, 2>& feet, const std::array<kinematics::LegGeometry, 2>& legs)
     : config_(config), last_link_pitch_(last_link_pitch), model_(model), feet_(feet), legs_(legs) {}
 
-void TorqueMap::stance(const BodyDynamics& body, const ContactVectors& force_W, JointCommand& command) const noexcept {
+void TorqueMap::map(const BodyDynamics& body, const std::array<LegTask, 2>& tasks,
+                    JointCommand& command) const noexcept {
+  command = JointCommand{};
   command.mode = DriveMode::kActive;
   command.num_joints = model_.num_joints;
-  command.position.setZero();
-  command.velocity.setZero();
-  command.kp.setZero();
-  command.kd.setZero();
+  for (int leg = 0; leg < 2; ++leg) {
+    const LegTask& task = tasks[static_cast<std::size_t>(leg)];
+    if (task.stance) {
+      stance(body, leg, task.force_W, command);
+    } else {
+      swing(body, leg, task.swing, command);
+    }
+  }
+}
+
+double TorqueMap::pitch_sum(int leg, const Vector3& p_LF, double trunk_pitch) const noexcept {
+  const kinematics::LegGeometry& geometry = legs_[static_cast<std::size_t>(leg)];
+  const double wanted = last_link_pitch_ - trunk_pitch;
+  // In the leg's plane, from the hip's pitch axis: x forward, y down.
+  const double x = p_LF.x(), y = std::hypot(p_LF.y(), p_LF.z()) - geometry.length[0];
+  const double L3 = geometry.length[3];
+  if (std::hypot(x + L3 * std::sin(wanted), y - L3 * std::cos(wanted)) <= config_.max_ankle) return wanted;
+  const double distance = std::hypot(x, y);
+  const double cosine =
+      (distance * distance + L3 * L3 - config_.max_ankle * config_.max_ankle) / (2.0 * distance * L3);
+  return std::atan2(-x, y) - std::acos(std::clamp(cosine, -1.0, 1.0));
+}
+
+void TorqueMap::stance(const BodyDynamics& body, int leg, const Vector3& force_W,
+                       JointCommand& command) const noexcept {
+  const auto side = static_cast<std::size_t>(leg);
+  const int first = 4 * leg;
   const double trunk_pitch = math::rpy_from_rotation(body.state.R_WB).y();
   const Vector3 w_WB_B = body.state.R_WB.transpose() * body.state.w_WB_W;
+  const rigid_body::Foot& foot = feet_[side];
+  const auto link = static_cast<std::size_t>(foot.body);
+  const Vector3 p_WF = body.kinematics.p_W[link] + body.kinematics.R_W[link] * foot.tip;
+  const Vector3 p_WG = p_WF - Vector3(0.0, 0.0, foot.radius);
   rigid_body::Jacobian J;
-  kinematics::LegKinematics leg;
-  for (int i = 0; i < 2; ++i) {
-    const auto side = static_cast<std::size_t>(i);
-    const int first = 4 * i;
-    const rigid_body::Foot& foot = feet_[side];
-    const auto link = static_cast<std::size_t>(foot.body);
-    const Vector3 p_WF = body.kinematics.p_W[link] + body.kinematics.R_W[link] * foot.tip;
-    const Vector3 p_WG = p_WF - Vector3(0.0, 0.0, foot.radius);
-    rigid_body::geometric_jacobian(model_, body.state, body.kinematics, foot.body, p_WG, J);
+  rigid_body::geometric_jacobian(model_, body.state, body.kinematics, foot.body, p_WG, J);
 
-    const kinematics::LegVector q = body.state.q.segment<4>(first), qd = body.state.qd.segment<4>(first);
-    kinematics::leg_kinematics(legs_[side], q, leg);
-    kinematics::LegVector posture;
-    static_cast<void>(kinematics::leg_ik(legs_[side], leg.foot, last_link_pitch_ - trunk_pitch, posture));
-    const kinematics::LegVector n = kinematics::null_direction(leg.J_foot);
-    const double n_sum = n.tail<3>().sum();
-    const Vector3 pitch_axis_B(0.0, std::cos(q[0]), std::sin(q[0]));
-    const double link_rate = qd.tail<3>().sum() + pitch_axis_B.dot(w_WB_B);
-    const double alpha = std::abs(n_sum) > kMinNullSum ? -link_rate / n_sum : 0.0;
-    const kinematics::LegVector posture_rate = qd + alpha * n;
-    const double inertia = n.dot(body.mass_matrix.block<4, 4>(6 + first, 6 + first) * n);
+  const kinematics::LegVector q = body.state.q.segment<4>(first), qd = body.state.qd.segment<4>(first);
+  kinematics::LegKinematics kinematics;
+  kinematics::leg_kinematics(legs_[side], q, kinematics);
+  kinematics::LegVector posture;
+  static_cast<void>(
+      kinematics::leg_ik(legs_[side], kinematics.foot, pitch_sum(leg, kinematics.foot, trunk_pitch), posture));
+  const kinematics::LegVector n = kinematics::null_direction(kinematics.J_foot);
+  const double n_sum = n.tail<3>().sum();
+  const double link_rate = qd.tail<3>().sum() + pitch_axis_B(q[0]).dot(w_WB_B);
+  const double alpha = std::abs(n_sum) > kMinNullSum ? -link_rate / n_sum : 0.0;
+  const kinematics::LegVector posture_rate = qd + alpha * n;
+  const double inertia = n.dot(body.mass_matrix.block<4, 4>(6 + first, 6 + first) * n);
 
-    command.feedforward_torque.segment<4>(first) =
-        -J.block<3, 4>(3, 6 + first).transpose() * force_W[side] + body.gravity.segment<4>(6 + first);
-    command.position.segment<4>(first) = posture + config_.lead * posture_rate;
-    command.velocity.segment<4>(first) = posture_rate;
-    command.kp.segment<3>(first + 1).setConstant(inertia * config_.null_space_kp);
-    command.kd.segment<3>(first + 1).setConstant(inertia * config_.null_space_kd);
-  }
+  command.feedforward_torque.segment<4>(first) =
+      -J.block<3, 4>(3, 6 + first).transpose() * force_W + body.gravity.segment<4>(6 + first);
+  command.position.segment<4>(first) = posture + config_.lead * posture_rate;
+  command.velocity.segment<4>(first) = posture_rate;
+  command.kp.segment<3>(first + 1).setConstant(inertia * config_.null_space_kp);
+  command.kd.segment<3>(first + 1).setConstant(inertia * config_.null_space_kd);
+}
+
+void TorqueMap::swing(const BodyDynamics& body, int leg, const planning::SwingReference& now,
+                      JointCommand& command) const noexcept {
+  const auto side = static_cast<std::size_t>(leg);
+  const int first = 4 * leg;
+  const double lead = config_.swing_lead;
+  const rigid_body::State& state = body.state;
+  // Trunk and foot, both `lead` on.
+  const Matrix3 R_BW = (math::exp_so3(lead * state.w_WB_W) * state.R_WB).transpose();
+  const Vector3 p_WB = state.p_WB + lead * state.v_WB;
+  const Vector3 p_WF = now.p + lead * (now.v + 0.5 * lead * now.a), v_WF = now.v + lead * now.a;
+  const Vector3 w_WB_B = R_BW * state.w_WB_W;
+
+  const Vector3 p_LF = kinematics::leg_rotation().transpose() * (R_BW * (p_WF - p_WB) - legs_[side].p_BL);
+  const double trunk_pitch = math::rpy_from_rotation(R_BW.transpose()).y();
+  kinematics::LegVector q;
+  static_cast<void>(kinematics::leg_ik(legs_[side], p_LF, pitch_sum(leg, p_LF, trunk_pitch), q));
+  Vector3 p_BF;
+  Eigen::Matrix<double, 3, 4> J_BF;
+  kinematics::foot_in_base(legs_[side], q, p_BF, J_BF);
+  Eigen::Matrix4d rates;
+  rates << J_BF, 0.0, 1.0, 1.0, 1.0;
+  const Eigen::PartialPivLU<Eigen::Matrix4d> solve(rates);
+  Eigen::Vector4d velocity, acceleration;
+  velocity << R_BW * (v_WF - state.v_WB) - w_WB_B.cross(p_BF), -pitch_axis_B(q[0]).dot(w_WB_B);
+  acceleration << R_BW * now.a, 0.0;
+  const auto M = body.mass_matrix.block<4, 4>(6 + first, 6 + first);
+  const kinematics::LegVector qd = solve.solve(velocity), qdd = solve.solve(acceleration);
+  if (!qd.allFinite() || !qdd.allFinite()) return;  // a leg that is straight: no gains, no torque
+
+  command.feedforward_torque.segment<4>(first) = M * qdd + body.gravity.segment<4>(6 + first);
+  command.position.segment<4>(first) = q;
+  command.velocity.segment<4>(first) = qd;
+  command.kp.segment<4>(first) = config_.swing_kp * M.diagonal();
+  command.kd.segment<4>(first) = config_.swing_kd * M.diagonal();
 }
 
 }  // namespace stance::behaviours

@@ -1,5 +1,6 @@
 #pragma once
-// From contact forces to the joint command of a stance leg. Feed-forward torque:
+// From contact forces to the joint command of a stance leg, and from a path to that of a swing leg. Stance, feed-forward
+// torque:
 //
 //   tau = -J_G^T f + tau_gravity
 //
@@ -15,6 +16,10 @@
 // scaled by the inertia along n: unscaled they are unstable on light links. The posture keeps the last link's pitch
 // against the world, not against the trunk: a pitching trunk then turns about its hips on legs that keep their shape,
 // far from the joints' limits.
+//
+// A swing leg follows its foot's reference, taken `swing_lead` on: position and velocity by the leg's inverse kinematics,
+// feed-forward M qdd + gravity, gains kp and kd times each joint's own inertia. Where the ankle would be farther than
+// `max_ankle` from the hip the last link stretches instead of the knee.
 #include "controller/behaviours/biped_config.hpp"
 #include "controller/kinematics/leg.hpp"
 #include "controller/rigid_body/dynamics.hpp"
@@ -30,15 +35,28 @@ struct BodyDynamics {
   rigid_body::VectorNu gravity;
 };
 
+/// What a leg is to do: bear a force, or swing its foot.
+struct LegTask {
+  bool stance = true;
+  Vector3 force_W = Vector3::Zero();  ///< N, of the ground on the foot
+  planning::SwingReference swing;     ///< where the foot is to be now, in W
+};
+
 class TorqueMap {
  public:
   TorqueMap(const TorqueMapConfig& config, double last_link_pitch, const rigid_body::Model& model,
             const std::array<rigid_body::Foot, 2>& feet, const std::array<kinematics::LegGeometry, 2>& legs);
 
-  /// Commands of both legs for `force_W` [N], of the ground on each foot in W.
-  void stance(const BodyDynamics& body, const ContactVectors& force_W, JointCommand& command) const noexcept;
+  /// Commands of both legs.
+  void map(const BodyDynamics& body, const std::array<LegTask, 2>& tasks, JointCommand& command) const noexcept;
 
  private:
+  void stance(const BodyDynamics& body, int leg, const Vector3& force_W, JointCommand& command) const noexcept;
+  void swing(const BodyDynamics& body, int leg, const planning::SwingReference& reference,
+             JointCommand& command) const noexcept;
+  /// What the last link's angle q1 + q2 + q3 should be for a foot at `p_LF` [m], the trunk pitched by `trunk_pitch` [rad].
+  double pitch_sum(int leg, const Vector3& p_LF, double trunk_pitch) const noexcept;
+
   TorqueMapConfig config_;
   double last_link_pitch_;
   const rigid_body::Model& model_;

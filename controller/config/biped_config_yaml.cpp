@@ -76,11 +76,128 @@ behaviours::StandConfig stand(StrictYaml yaml) {
   return c;
 }
 
+planning::Vector2 pair(StrictYaml& yaml, const char* key) {
+  const auto values = yaml.numbers(key, 2);
+  return {values[0], values[1]};
+}
+
+planning::FootholdConfig footholds(StrictYaml yaml) {
+  planning::FootholdConfig c;
+  c.step_width = yaml.number("step_width");
+  c.swing_time = yaml.number("swing_time");
+  c.double_support = yaml.number("double_support");
+  c.min_swing_time = yaml.number("min_swing_time");
+  c.max_swing_time = yaml.number("max_swing_time");
+  c.min_second_time = yaml.number("min_second_time");
+  c.max_second_time = yaml.number("max_second_time");
+  c.min_time_left = yaml.number("min_time_left");
+  c.max_forward = yaml.number("max_forward");
+  c.min_lateral = yaml.number("min_lateral");
+  c.max_lateral = yaml.number("max_lateral");
+  c.crossing_forward = yaml.number("crossing_forward");
+  c.crossing_lateral = yaml.number("crossing_lateral");
+  c.hip_reach = yaml.number("hip_reach");
+  c.centre_reach = yaml.number("centre_reach");
+  c.foot_speed = yaml.number("foot_speed");
+  c.path_clearance = yaml.number("path_clearance");
+  c.crossing_cost = yaml.number("crossing_cost");
+  c.crossing_threshold = yaml.number("crossing_threshold");
+  yaml.finish();
+  return c;
+}
+
+planning::SwingConfig swing(StrictYaml yaml) {
+  planning::SwingConfig c;
+  c.height = yaml.number("height");
+  c.apex = yaml.number("apex");
+  c.depth = yaml.number("depth");
+  c.late_speed = yaml.number("late_speed");
+  c.late_depth = yaml.number("late_depth");
+  c.min_time_left = yaml.number("min_time_left");
+  yaml.finish();
+  return c;
+}
+
+planning::GaitConfig gait(StrictYaml yaml) {
+  planning::GaitConfig c;
+  c.footholds = footholds(yaml.mapping("footholds"));
+  c.swing = swing(yaml.mapping("swing"));
+  c.first_double_support = yaml.number("first_double_support");
+  c.capture_double_support = yaml.number("capture_double_support");
+  c.recovery_double_support = yaml.number("recovery_double_support");
+  c.recovery_threshold = yaml.number("recovery_threshold");
+  c.freeze = yaml.number("freeze");
+  c.touchdown_phase = yaml.number("touchdown_phase");
+  c.slope_gain = yaml.number("slope_gain");
+  c.slope_min_step = yaml.number("slope_min_step");
+  c.max_slope = yaml.number("max_slope");
+  yaml.finish();
+  return c;
+}
+
+planning::VelocityConfig velocity(StrictYaml yaml) {
+  planning::VelocityConfig c;
+  c.min = pair(yaml, "min");
+  c.max = pair(yaml, "max");
+  c.max_yaw_rate = yaml.number("max_yaw_rate");
+  c.acceleration = yaml.number("acceleration");
+  c.yaw_acceleration = yaml.number("yaw_acceleration");
+  c.integral_gain = yaml.number("integral_gain");
+  c.integral_limit = pair(yaml, "integral_limit");
+  c.filter_time = yaml.number("filter_time");
+  c.max_error = yaml.number("max_error");
+  c.max_yaw_error = yaml.number("max_yaw_error");
+  yaml.finish();
+  return c;
+}
+
+planning::HorizonConfig horizon(StrictYaml yaml) {
+  planning::HorizonConfig c;
+  c.num_fine = yaml.integer("num_fine");
+  c.num_coarse = yaml.integer("num_coarse");
+  c.coarse_periods = yaml.integer("coarse_periods");
+  yaml.finish();
+  return c;
+}
+
+behaviours::WalkConfig walk(StrictYaml yaml) {
+  behaviours::WalkConfig c;
+  c.horizon = horizon(yaml.mapping("horizon"));
+  c.gait = gait(yaml.mapping("gait"));
+  c.velocity = velocity(yaml.mapping("velocity"));
+  c.friction = yaml.number("friction");
+  const auto weights = yaml.numbers("state_weights", 12), recovery = yaml.numbers("recovery_weights", 12);
+  c.state_weights = Eigen::Map<const CentroidalState>(weights.data());
+  c.recovery_weights = Eigen::Map<const CentroidalState>(recovery.data());
+  c.force_weight = yaml.number("force_weight");
+  c.height_integral_gain = yaml.number("height_integral_gain");
+  c.height_integral_limit = yaml.number("height_integral_limit");
+  c.height_offset_rate = yaml.number("height_offset_rate");
+  yaml.finish();
+  return c;
+}
+
+behaviours::SteppingConfig stepping(StrictYaml yaml) {
+  behaviours::SteppingConfig c;
+  c.capture = pair(yaml, "capture");
+  c.capture_pitch = yaml.number("capture_pitch");
+  c.min_steps = yaml.integer("min_steps");
+  c.settled = pair(yaml, "settled");
+  c.settled_feet = yaml.number("settled_feet");
+  c.settled_pitch = yaml.number("settled_pitch");
+  yaml.finish();
+  return c;
+}
+
 behaviours::TorqueMapConfig torque_map(StrictYaml yaml) {
   behaviours::TorqueMapConfig c;
   c.null_space_kp = yaml.number("null_space_kp");
   c.null_space_kd = yaml.number("null_space_kd");
   c.lead = yaml.number("lead");
+  c.swing_kp = yaml.number("swing_kp");
+  c.swing_kd = yaml.number("swing_kd");
+  c.swing_lead = yaml.number("swing_lead");
+  c.max_ankle = yaml.number("max_ankle");
   yaml.finish();
   return c;
 }
@@ -106,6 +223,8 @@ behaviours::BipedConfig biped_config(const RobotDescription& robot) {
   c.com_offset_observer = com_offset_observer(yaml.mapping("com_offset_observer"), c.com_offset_quiet_momentum);
   force_qp(yaml.mapping("force_qp"), c.force_qp, c.force_limits);
   c.stand = stand(yaml.mapping("stand"));
+  c.walk = walk(yaml.mapping("walk"));
+  c.stepping = stepping(yaml.mapping("stepping"));
   c.torque_map = torque_map(yaml.mapping("torque_map"));
   safety(yaml.mapping("safety"), c);
   yaml.finish();

@@ -72,4 +72,8 @@ Matrix3 biped_effective_inertia(const rigid_body::Model& model, std::span<const 
 Matrix3 standing_inertia(const rigid_body::Model& model, std::span<const rigid_body::Foot> feet,
                          const JointVector& q) noexcept;
 
+/// What stepping's centroidal model has: the same, the mean of that on the one foot and on the other.
+Matrix3 stepping_inertia(const rigid_body::Model& model, std::span<const rigid_body::Foot> feet,
+                         const JointVector& q) noexcept;
+
 }  // namespace stance::kinematics

@@ -54,6 +54,17 @@ LegGeometry leg_geometry(const rigid_body::Model& model, const rigid_body::Foot&
   return leg;
 }
 
+/// The diagonal of biped_effective_inertia with the trunk upright.
+Matrix3 upright_inertia(const rigid_body::Model& model, std::span<const rigid_body::Foot> feet, const JointVector& q,
+                        const std::array<bool, 2>& held) noexcept {
+  rigid_body::State state;
+  state.q = q;
+  rigid_body::Kinematics kinematics;
+  rigid_body::forward_kinematics(model, state, kinematics);
+  const Matrix3 inertia = biped_effective_inertia(model, feet, state, kinematics, held);
+  return inertia.diagonal().asDiagonal();
+}
+
 }  // namespace
 
 std::array<LegGeometry, 2> leg_geometries(const rigid_body::Model& model, std::span<const rigid_body::Foot> feet) {
@@ -89,12 +100,12 @@ Matrix3 biped_effective_inertia(const rigid_body::Model& model, std::span<const 
 
 Matrix3 standing_inertia(const rigid_body::Model& model, std::span<const rigid_body::Foot> feet,
                          const JointVector& q) noexcept {
-  rigid_body::State state;
-  state.q = q;
-  rigid_body::Kinematics kinematics;
-  rigid_body::forward_kinematics(model, state, kinematics);
-  const Matrix3 inertia = biped_effective_inertia(model, feet, state, kinematics, {true, true});
-  return inertia.diagonal().asDiagonal();
+  return upright_inertia(model, feet, q, {true, true});
+}
+
+Matrix3 stepping_inertia(const rigid_body::Model& model, std::span<const rigid_body::Foot> feet,
+                         const JointVector& q) noexcept {
+  return 0.5 * (upright_inertia(model, feet, q, {true, false}) + upright_inertia(model, feet, q, {false, true}));
 }
 
 }  // namespace stance::kinematics
