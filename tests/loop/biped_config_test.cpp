@@ -72,7 +72,7 @@ TEST_CASE("TheBipedsOwnConfigurationIsRead") {
         yaml["estimator"]["initial_accelerometer_bias_sigma"].as<double>());
   CHECK(c.com_offset_observer.bandwidth == yaml["com_offset_observer"]["bandwidth"].as<double>());
   CHECK(c.com_offset_quiet_momentum == yaml["com_offset_observer"]["quiet_momentum"].as<double>());
-  CHECK(c.force_qp.engine == QpEngine::kOsqpCondensed);
+  CHECK(c.force_qp.engine == QpEngine::kOsqpSparse);
   CHECK(c.force_qp.max_iterations == yaml["force_qp"]["max_iterations"].as<int>());
   CHECK(c.force_limits.normal_force_max == yaml["force_qp"]["normal_force_max"].as<double>());
   CHECK(c.stand.stages == yaml["stand"]["stages"].as<int>());
@@ -107,7 +107,7 @@ TEST_CASE("AnyKeyOfTheControllersSectionThatIsMissingIsNamed") {
 
 TEST_CASE("AnUnknownKeyInAnyMappingOfTheControllersSectionIsNamed") {
   const std::vector<Mapping> mappings = controller_mappings();
-  CHECK(mappings.size() == 7);
+  CHECK(mappings.size() == 14);
   for (const Mapping& mapping : mappings) {
     const std::string text = edited(mapping.steps, [](YAML::Node& node) { node["surprise"] = 1; });
     CAPTURE(mapping.path);
@@ -169,6 +169,25 @@ TEST_CASE("AValueOutOfRangeIsRefusedByItsName") {
       Case{"stand.force_weight", "0", "force_weight"},
       Case{"stand.height_integral_gain", "-1", "height_integral_gain"},
       Case{"stand.height_integral_limit", "-1", "height_integral_limit"},
+      Case{"walk.horizon.num_fine", "0", "num_fine"},
+      Case{"walk.horizon.num_coarse", "23", "horizon"},
+      Case{"walk.horizon.coarse_periods", "11", "coarse_periods"},
+      Case{"walk.friction", "0", "friction"},
+      Case{"walk.force_weight", "0", "force_weight"},
+      Case{"walk.velocity.max", "[-0.1, 0.5]", "velocity.max"},
+      Case{"walk.velocity.acceleration", "0", "acceleration"},
+      Case{"walk.gait.freeze", "-0.01", "freeze"},
+      Case{"walk.gait.touchdown_phase", "1", "touchdown_phase"},
+      Case{"walk.gait.footholds.swing_time", "0", "swing_time"},
+      Case{"walk.gait.footholds.max_second_time", "0.5", "max_second_time"},
+      Case{"walk.gait.footholds.crossing_forward", "0.8", "crossing_forward"},
+      Case{"walk.gait.swing.apex", "1", "apex"},
+      Case{"walk.gait.swing.late_depth", "0", "late_depth"},
+      Case{"stepping.min_steps", "0", "min_steps"},
+      Case{"stepping.settled", "[0, 0.05]", "settled"},
+      Case{"torque_map.swing_kp", "-1", "swing_kp"},
+      Case{"torque_map.swing_lead", "0.05", "swing_lead"},
+      Case{"torque_map.max_ankle", "0", "max_ankle"},
       Case{"torque_map.null_space_kp", "-1", "null_space_kp"},
       Case{"torque_map.null_space_kd", "-1", "null_space_kd"},
       Case{"torque_map.lead", "0.05", "lead"},
@@ -219,13 +238,13 @@ TEST_CASE("AnUnknownEngineAndAWrongNumberOfWeightsAreRefusedByPath") {
 
 TEST_CASE("WithEngineChangesTheEngineAndNothingElse") {
   const std::string text = biped().yaml_text;
-  const std::string sparse = with_engine(text, "osqp-sparse");
-  CHECK(biped_config_of(sparse).force_qp.engine == QpEngine::kOsqpSparse);
-  YAML::Node before = YAML::Load(text), after = YAML::Load(sparse);
+  const std::string condensed = with_engine(text, "osqp-condensed");
+  CHECK(biped_config_of(condensed).force_qp.engine == QpEngine::kOsqpCondensed);
+  YAML::Node before = YAML::Load(text), after = YAML::Load(condensed);
   before["controller"]["force_qp"].remove("engine");
   after["controller"]["force_qp"].remove("engine");
   CHECK(YAML::Dump(before) == YAML::Dump(after));
-  CHECK_NOTHROW(compose(robot_from_texts(sparse, biped().urdf_text)));
+  CHECK_NOTHROW(compose(robot_from_texts(condensed, biped().urdf_text)));
   CHECK_THROWS_MATCHES(compose(robot_from_texts(with_engine(text, "none"), biped().urdf_text)), ConfigError,
                        MessageMatches(ContainsSubstring("controller.force_qp.engine is 'none'")));
 }

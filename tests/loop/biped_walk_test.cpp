@@ -1,0 +1,130 @@
+// The biped steps, in the loop with the simulator: it walks as it is told, meets pushes by stepping, and stands again.
+#include <algorithm>
+#include <catch2/catch_message.hpp>
+#include <catch2/catch_test_macros.hpp>
+#include <cmath>
+
+#include "tests/loop/biped_rig.hpp"
+
+namespace stance::behaviours {
+namespace {
+
+using stance_msgs::user_command_t;
+using test::BipedRig;
+using test::push;
+using test::quiet_stand;
+
+constexpr int kSettled = 50;    // ticks
+constexpr int kSecond = 100;    // ticks
+
+user_command_t walk_command(std::int64_t seq, double vx, double vy, double yaw_rate) {
+  user_command_t command{};
+  command.seq = seq;
+  command.behaviour = user_command_t::WALK;
+  command.velocity[0] = vx;
+  command.velocity[1] = vy;
+  command.yaw_rate = yaw_rate;
+  return command;
+}
+user_command_t stand_command(std::int64_t seq) {
+  user_command_t command{};
+  command.seq = seq;
+  return command;
+}
+
+double yaw_of(const BipedRig& rig) {
+  const auto& q = rig.simulator.truth().quat_WB;
+  return std::atan2(2.0 * (q[0] * q[3] + q[1] * q[2]), 1.0 - 2.0 * (q[2] * q[2] + q[3] * q[3]));
+}
+
+}  // namespace
+
+TEST_CASE("ItWalksAsTheOperatorWantsAndStandsAgain") {
+  struct Case {
+    double vx, vy, yaw_rate;
+  };
+  for (const Case& c : {Case{0.0, 0.0, 0.0}, Case{0.5, 0.0, 0.0}, Case{1.2, 0.0, 0.0}, Case{-0.4, 0.0, 0.0},
+                        Case{0.0, 0.3, 0.0}, Case{0.0, 0.0, 0.6}}) {
+    CAPTURE(c.vx, c.vy, c.yaw_rate);
+    BipedRig rig;
+    rig.tick_times(kSettled);
+    rig.give(walk_command(1, c.vx, c.vy, c.yaw_rate));
+    rig.tick_times(4 * kSecond);  // ramps, and the velocity's integral
+    CHECK(rig.trace().behaviour == Behaviour::kWalk);
+    const auto before = rig.simulator.truth();
+    const double yaw_before = yaw_of(rig);
+    // Whole pairs of steps.
+    constexpr int ticks = 480;
+    double turned = 0.0, last = yaw_before;
+    for (int k = 0; k < ticks; ++k) {
+      rig.tick();
+      turned += std::remainder(yaw_of(rig) - last, 2.0 * M_PI);
+      last = yaw_of(rig);
+    }
+    const auto& after = rig.simulator.truth();
+    constexpr double time = ticks * kControlPeriod;
+    if (c.yaw_rate == 0.0) {
+      CHECK(std::abs((after.p_WC[0] - before.p_WC[0]) / time - c.vx) < 0.05 + 0.05 * std::abs(c.vx));
+      CHECK(std::abs((after.p_WC[1] - before.p_WC[1]) / time - c.vy) < 0.05);
+    }
+    CHECK(std::abs(turned / time - c.yaw_rate) < 0.03);
+    rig.give(stand_command(2));
+    rig.tick_times(6 * kSecond);
+    CHECK(rig.trace().behaviour == Behaviour::kStand);
+    CHECK(rig.trace().safety == SafetyMode::kRun);
+    CHECK(rig.count(Fault::kQpFailed) == 0);
+    CHECK_FALSE(rig.simulator.fallen());
+    CHECK(rig.tilt() < 0.05);
+  }
+}
+
+TEST_CASE("APushTooHardToStandIsMetByStepsAndThenItStands") {
+  constexpr double impulse = 5.0, duration = 0.1;  // N s, s
+  for (int direction = 0; direction < 8; ++direction) {
+    const double angle = direction * M_PI / 4.0;
+    CAPTURE(direction);
+    sim::Scenario scenario = quiet_stand();
+    scenario.pushes = {push(0.5, impulse / duration * std::cos(angle), impulse / duration * std::sin(angle), 0.0)};
+    BipedRig rig(scenario);
+    bool stepped = false;
+    for (int k = 0; k < 8 * kSecond; ++k) {
+      rig.tick();
+      stepped = stepped || rig.trace().behaviour == Behaviour::kWalk;
+    }
+    CHECK_FALSE(rig.simulator.fallen());
+    CHECK(stepped);
+    CHECK(rig.trace().behaviour == Behaviour::kStand);
+    CHECK(rig.tilt() < 0.05);
+  }
+}
+
+TEST_CASE("APushWithinTheStancesReachTakesNoStep") {
+  sim::Scenario scenario = quiet_stand();
+  scenario.pushes = {push(0.5, 0.0, 30.0, 0.0)};
+  BipedRig rig(scenario);
+  for (int k = 0; k < 3 * kSecond; ++k) {
+    rig.tick();
+    REQUIRE(rig.trace().behaviour == Behaviour::kStand);
+  }
+  CHECK_FALSE(rig.simulator.fallen());
+}
+
+TEST_CASE("ThePlanSaysWhichFeetBearAndTheSwingFootBearsNothing") {
+  BipedRig rig;
+  rig.tick_times(kSettled);
+  rig.give(walk_command(1, 0.3, 0.0, 0.0));
+  int single = 0;
+  for (int k = 0; k < 3 * kSecond; ++k) {
+    rig.tick();
+    const ForcePlan& plan = rig.ticker.output().plan;
+    REQUIRE((plan.contact[0][0] || plan.contact[0][1]));
+    for (std::size_t foot = 0; foot < 2; ++foot) {
+      if (plan.contact[0][foot]) continue;
+      ++single;
+      REQUIRE(plan.force[0][foot].norm() < 1e-6);
+    }
+  }
+  CHECK(single > kSecond);
+}
+
+}  // namespace stance::behaviours
