@@ -246,16 +246,15 @@ void BipedController::choose_behaviour(const WalkInput& now) noexcept {
     return Vector2(cosine * v.x() + sine * v.y(), -sine * v.x() + cosine * v.y());
   };
   // The divergent component of motion from the middle of the feet, and the feet from each other.
-  const Vector2 xi =
-      in_heading(now.p_WC + now.v_WC / walk_.gait().omega() - 0.5 * (now.p_WF[0] + now.p_WF[1]));
+  const Vector2 xi = in_heading(now.p_WC + now.v_WC / walk_.gait().omega() - 0.5 * (now.p_WF[0] + now.p_WF[1]));
   const bool wanted = memory_.user_command.behaviour == Behaviour::kWalk;
   if (!memory_.stepping) {
-    const bool pushed = std::abs(xi.x()) > c.capture.x() || std::abs(xi.y()) > c.capture.y() ||
-                        std::abs(now.rpy.y()) > c.capture_pitch;
+    const bool pushed =
+        std::abs(xi.x()) > c.capture.x() || std::abs(xi.y()) > c.capture.y() || std::abs(now.rpy.y()) > c.capture_pitch;
     if (!wanted && !pushed) return;
     const planning::GaitConfig& gait = config_.walk.gait;
-    // The foot that the robot leans away from lifts.
-    walk_.enter(now, xi.y() < 0.0 ? 0 : 1, pushed ? gait.capture_double_support : gait.first_double_support);
+    const double double_support = pushed ? gait.capture_double_support : gait.first_double_support;
+    walk_.enter(now, walk_.better_swing(now, double_support), double_support);
     memory_.stepping = true;
     memory_.standing = false;
     return;

@@ -40,8 +40,7 @@ double TorqueMap::pitch_sum(int leg, const Vector3& p_LF, double trunk_pitch) co
   const double L3 = geometry.length[3];
   if (std::hypot(x + L3 * std::sin(wanted), y - L3 * std::cos(wanted)) <= config_.max_ankle) return wanted;
   const double distance = std::hypot(x, y);
-  const double cosine =
-      (distance * distance + L3 * L3 - config_.max_ankle * config_.max_ankle) / (2.0 * distance * L3);
+  const double cosine = (distance * distance + L3 * L3 - config_.max_ankle * config_.max_ankle) / (2.0 * distance * L3);
   return std::atan2(-x, y) - std::acos(std::clamp(cosine, -1.0, 1.0));
 }
 

@@ -1,6 +1,6 @@
 #pragma once
-// From contact forces to the joint command of a stance leg, and from a path to that of a swing leg. Stance, feed-forward
-// torque:
+// From contact forces to the joint command of a stance leg, and from a path to that of a swing leg. Stance,
+// feed-forward torque:
 //
 //   tau = -J_G^T f + tau_gravity
 //
@@ -17,9 +17,9 @@
 // against the world, not against the trunk: a pitching trunk then turns about its hips on legs that keep their shape,
 // far from the joints' limits.
 //
-// A swing leg follows its foot's reference, taken `swing_lead` on: position and velocity by the leg's inverse kinematics,
-// feed-forward M qdd + gravity, gains kp and kd times each joint's own inertia. Where the ankle would be farther than
-// `max_ankle` from the hip the last link stretches instead of the knee.
+// A swing leg follows its foot's reference, taken `swing_lead` on: position and velocity by the leg's inverse
+// kinematics, feed-forward M qdd + gravity, gains kp and kd times each joint's own inertia. Where the ankle would be
+// farther than `max_ankle` from the hip the last link stretches instead of the knee.
 #include "controller/behaviours/biped_config.hpp"
 #include "controller/kinematics/leg.hpp"
 #include "controller/rigid_body/dynamics.hpp"
@@ -54,7 +54,8 @@ class TorqueMap {
   void stance(const BodyDynamics& body, int leg, const Vector3& force_W, JointCommand& command) const noexcept;
   void swing(const BodyDynamics& body, int leg, const planning::SwingReference& reference,
              JointCommand& command) const noexcept;
-  /// What the last link's angle q1 + q2 + q3 should be for a foot at `p_LF` [m], the trunk pitched by `trunk_pitch` [rad].
+  /// What the last link's angle q1 + q2 + q3 should be for a foot at `p_LF` [m], the trunk pitched by `trunk_pitch`
+  /// [rad].
   double pitch_sum(int leg, const Vector3& p_LF, double trunk_pitch) const noexcept;
 
   TorqueMapConfig config_;

@@ -1,6 +1,7 @@
 #include "controller/behaviours/walk.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 namespace stance::behaviours {
@@ -39,6 +40,22 @@ planning::GaitInput Walk::gait_input(const WalkInput& input) const noexcept {
   out.velocity = velocity_.effective();
   out.yaw = velocity_.yaw();
   return out;
+}
+
+int Walk::better_swing(const WalkInput& input, double double_support) const noexcept {
+  const planning::Pendulum now{input.p_WC.head<2>(), input.v_WC.head<2>()};
+  std::array<double, kFeet> cost{};
+  for (int swing = 0; swing < kFeet; ++swing) {
+    const Vector2 foot = input.p_WF[static_cast<std::size_t>(swing)].head<2>();
+    const Vector2 support = input.p_WF[static_cast<std::size_t>(1 - swing)].head<2>();
+    // The load moves over to the support meanwhile.
+    const planning::Pendulum then = planning::swung(now, 0.5 * (foot + support), gait_.omega(), double_support);
+    cost[static_cast<std::size_t>(swing)] =
+        planning::plan_footholds(config_.gait.footholds,
+                                 gait_.problem(then, support, foot, swing, Vector2::Zero(), input.rpy.z()))
+            .cost;
+  }
+  return cost[0] <= cost[1] ? 0 : 1;
 }
 
 void Walk::enter(const WalkInput& input, int swing, double double_support) noexcept {

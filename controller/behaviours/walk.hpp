@@ -1,5 +1,6 @@
 #pragma once
-// Stepping on two point feet: the gait's plan (planning/), rolled out over the horizon, and the force QP that follows it.
+// Stepping on two point feet: the gait's plan (planning/), rolled out over the horizon, and the force QP that follows
+// it.
 //
 // The QP is written in W. Its reference is the pendulum that starts where the robot is and rolls over the planned
 // footholds; each stage is linearised about that pendulum's centre of mass and force (coupling term, centroidal.hpp).
@@ -23,10 +24,10 @@ struct WalkInput {
   Vector3 w_WB_W = Vector3::Zero();                               ///< rad/s
   std::array<Vector3, 2> p_WF{Vector3::Zero(), Vector3::Zero()};  ///< m, tips of the feet
   std::array<bool, 2> contact_switch{};
-  Vector2 velocity = Vector2::Zero();                             ///< m/s, in H, wanted
-  double yaw_rate = 0.0;                                          ///< rad/s, wanted
-  double height_offset = 0.0;                                     ///< m, wanted
-  int periods = 1;                                                ///< control periods since the last call
+  Vector2 velocity = Vector2::Zero();  ///< m/s, in H, wanted
+  double yaw_rate = 0.0;               ///< rad/s, wanted
+  double height_offset = 0.0;          ///< m, wanted
+  int periods = 1;                     ///< control periods since the last call
 };
 
 class Walk {
@@ -35,6 +36,9 @@ class Walk {
   /// hip from the trunk's middle. Throws std::invalid_argument.
   Walk(const WalkConfig& config, const ForceLimits& limits, const force_qp::Settings& qp, double mass,
        const Matrix3& inertia, double nominal_height, double hip_lateral, double foot_radius);
+
+  /// The foot whose swing, after `double_support` [s], promises the better footholds.
+  int better_swing(const WalkInput& input, double double_support) const noexcept;
 
   /// Takes up stepping; after `double_support` [s] foot `swing` lifts.
   void enter(const WalkInput& input, int swing, double double_support) noexcept;

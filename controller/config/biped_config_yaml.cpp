@@ -144,6 +144,7 @@ planning::VelocityConfig velocity(StrictYaml yaml) {
   c.yaw_acceleration = yaml.number("yaw_acceleration");
   c.integral_gain = yaml.number("integral_gain");
   c.integral_limit = pair(yaml, "integral_limit");
+  c.integral_share = yaml.number("integral_share");
   c.filter_time = yaml.number("filter_time");
   c.max_error = yaml.number("max_error");
   c.max_yaw_error = yaml.number("max_yaw_error");

@@ -13,12 +13,12 @@ namespace {
 constexpr double kTimeStep = 0.01, kSecondTimeStep = 0.02;  // s, of the grids
 constexpr int kMaxSecondTimes = 16;
 // Deviations that cost 1.
-constexpr double kDeviation = 0.02;     // m, of the divergent component, of foot travel
-constexpr double kDuration = 0.05;      // s
-constexpr double kReach = 0.03;         // m
-constexpr double kClearance = 0.01;     // m
-constexpr double kFirstWeight = 0.25;   // of the first deviation, which the second step may mend
-constexpr double kChangeWeight = 0.5;   // of a change of T1 since the last tick
+constexpr double kDeviation = 0.02;    // m, of the divergent component, of foot travel
+constexpr double kDuration = 0.05;     // s
+constexpr double kReach = 0.03;        // m
+constexpr double kClearance = 0.01;    // m
+constexpr double kFirstWeight = 0.25;  // of the first deviation, which the second step may mend
+constexpr double kChangeWeight = 0.5;  // of a change of T1 since the last tick
 
 double square(double x) noexcept { return x * x; }
 
@@ -65,7 +65,9 @@ struct Grown {
 double reach_cost(const FootholdConfig& c, const Vector2& hip) noexcept {
   return square(std::max(0.0, hip.norm() - c.hip_reach) / kReach);
 }
-double duration_cost(const FootholdConfig& c, double time) noexcept { return square((time - c.swing_time) / kDuration); }
+double duration_cost(const FootholdConfig& c, double time) noexcept {
+  return square((time - c.swing_time) / kDuration);
+}
 
 struct Search {
   const FootholdConfig& c;
@@ -110,8 +112,8 @@ struct Search {
       const double over2 = std::max(0.0, (U2 + U).norm() - c.foot_speed * second.time);
       const double clearance2 = std::max(0.0, c.path_clearance - distance_of_origin(-U, U2));
       const double cost = first + square(deviation2 / kDeviation) + square(over2 / kDeviation) +
-                          duration_cost(c, second.time) +
-                          reach_cost(c, X2 + Vector2(0.0, p.side * p.hip_lateral)) + square(clearance2 / kClearance);
+                          duration_cost(c, second.time) + reach_cost(c, X2 + Vector2(0.0, p.side * p.hip_lateral)) +
+                          square(clearance2 / kClearance);
       if (cost < best.cost) best = {U, T1, second.time, deviation, deviation2, cost, crossing};
     }
   }

@@ -85,8 +85,7 @@ void Gait::step(const GaitInput& input, double dt) noexcept {
       state_.swing_time = state_.next_swing_time;
       swing_.lift_off(input.p_WF[static_cast<std::size_t>(state_.swing)]);
     }
-  } else if (swing_.phase() > config_.touchdown_phase &&
-             input.contact_switch[static_cast<std::size_t>(state_.swing)]) {
+  } else if (swing_.phase() > config_.touchdown_phase && input.contact_switch[static_cast<std::size_t>(state_.swing)]) {
     touch_down(input);
   }
   for (int foot = 0; foot < 2; ++foot) {
@@ -97,14 +96,14 @@ void Gait::step(const GaitInput& input, double dt) noexcept {
     plan(input);
     const Vector3& support = state_.p_WF[static_cast<std::size_t>(state_.support())];
     const double forward = in_heading(input.yaw, state_.foothold - support.head<2>()).x();
-    swing_.step(state_.foothold, support.z() + state_.slope * forward,
-                std::max(0.0, state_.swing_time - state_.time), dt);
+    swing_.step(state_.foothold, support.z() + state_.slope * forward, std::max(0.0, state_.swing_time - state_.time),
+                dt);
   }
 }
 
 void Gait::touch_down(const GaitInput& input) noexcept {
-  const Vector3 step = input.p_WF[static_cast<std::size_t>(state_.swing)] -
-                       input.p_WF[static_cast<std::size_t>(state_.support())];
+  const Vector3 step =
+      input.p_WF[static_cast<std::size_t>(state_.swing)] - input.p_WF[static_cast<std::size_t>(state_.support())];
   const double forward = in_heading(input.yaw, step.head<2>()).x();
   if (std::abs(forward) > config_.slope_min_step) {
     const double slope = std::clamp(step.z() / forward, -config_.max_slope, config_.max_slope);

@@ -26,11 +26,11 @@ struct GaitConfig {
 
 /// Where the robot is, as the gait sees it. Foot 0 is the left one.
 struct GaitInput {
-  Pendulum com;                                                  ///< in W
+  Pendulum com;                                                   ///< in W
   std::array<Vector3, 2> p_WF{Vector3::Zero(), Vector3::Zero()};  ///< m, tips
   std::array<bool, 2> contact_switch{};
-  Vector2 velocity = Vector2::Zero();                            ///< m/s, wanted, in H
-  double yaw = 0.0;                                              ///< rad, of H
+  Vector2 velocity = Vector2::Zero();  ///< m/s, wanted, in H
+  double yaw = 0.0;                    ///< rad, of H
 };
 
 struct GaitState {
@@ -43,8 +43,8 @@ struct GaitState {
   Vector2 foothold = Vector2::Zero();  ///< m, of this swing, in W
   int crossing = 0;
   bool recovering = false;
-  int steps = 0;                       ///< touchdowns since the start
-  double slope = 0.0;                  ///< dz/dx of the ground, forward in H
+  int steps = 0;                                                  ///< touchdowns since the start
+  double slope = 0.0;                                             ///< dz/dx of the ground, forward in H
   std::array<Vector3, 2> p_WF{Vector3::Zero(), Vector3::Zero()};  ///< m, tips: where they stand, or stood last
 
   bool stance(int foot) const noexcept { return phase == GaitPhase::kDoubleSupport || foot != swing; }

@@ -14,16 +14,16 @@ struct HorizonConfig {
   int num_coarse = 0;
   int coarse_periods = 1;  ///< control periods in a coarse stage
   int num_stages() const noexcept { return num_fine + num_coarse; }
-  void validate() const;   ///< throws std::invalid_argument naming the field, its value and the range
+  void validate() const;  ///< throws std::invalid_argument naming the field, its value and the range
 };
 
 /// One stage, from its start to its end.
 struct HorizonStage {
-  double duration = 0.0;                 ///< s
-  std::array<bool, 2> contact{};         ///< in the stage's middle
+  double duration = 0.0;                                          ///< s
+  std::array<bool, 2> contact{};                                  ///< in the stage's middle
   std::array<Vector2, 2> foot{Vector2::Zero(), Vector2::Zero()};  ///< m, in W, in the stage's middle
-  Vector2 zmp = Vector2::Zero();         ///< m, in W, of the pendulum in the stage's middle
-  Pendulum start, middle, end;           ///< in W
+  Vector2 zmp = Vector2::Zero();                                  ///< m, in W, of the pendulum in the stage's middle
+  Pendulum start, middle, end;                                    ///< in W
 };
 
 class Horizon {

@@ -1,7 +1,7 @@
 #pragma once
-// The linear inverted pendulum at constant height: p'' = omega^2 (p - z), z the point where the ground's force acts. Its
-// divergent component of motion xi = p + p'/omega obeys xi' = omega (xi - z), the convergent one q = p - p'/omega obeys
-// q' = -omega (q - z).
+// The linear inverted pendulum at constant height: p'' = omega^2 (p - z), z the point where the ground's force acts.
+// Its divergent component of motion xi = p + p'/omega obeys xi' = omega (xi - z), the convergent one q = p - p'/omega
+// obeys q' = -omega (q - z).
 #include <Eigen/Core>
 
 namespace stance::planning {

@@ -1,19 +1,19 @@
 #pragma once
-// The swing foot's way to its foothold: minimum jerk in x and y, up and down in z by the swing's phase, planned anew each
-// tick from where the reference is.
+// The swing foot's way to its foothold: minimum jerk in x and y, up and down in z by the swing's phase, planned anew
+// each tick from where the reference is.
 #include "controller/math/so3.hpp"
 #include "controller/planning/pendulum.hpp"
 
 namespace stance::planning {
 
 struct SwingConfig {
-  double height = 0.0;           ///< m, over the higher of lift-off and touchdown
-  double apex = 0.0;             ///< phase of the highest point, 0..1
-  double depth = 0.0;            ///< m, below the expected ground, where the foot is sent
-  double late_speed = 0.0;       ///< m/s, down, of a foot that finds no ground in time
-  double late_depth = 0.0;       ///< m, below the expected ground, where that ends
-  double min_time_left = 0.0;    ///< s, in which the horizontal way is planned at the least
-  void validate() const;         ///< throws std::invalid_argument naming the field, its value and the range
+  double height = 0.0;         ///< m, over the higher of lift-off and touchdown
+  double apex = 0.0;           ///< phase of the highest point, 0..1
+  double depth = 0.0;          ///< m, below the expected ground, where the foot is sent
+  double late_speed = 0.0;     ///< m/s, down, of a foot that finds no ground in time
+  double late_depth = 0.0;     ///< m, below the expected ground, where that ends
+  double min_time_left = 0.0;  ///< s, in which the horizontal way is planned at the least
+  void validate() const;       ///< throws std::invalid_argument naming the field, its value and the range
 };
 
 struct SwingReference {

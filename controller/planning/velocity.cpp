@@ -9,7 +9,9 @@ namespace stance::planning {
 namespace {
 
 void require(bool good, const char* field, double value, const char* range) {
-  if (!good) throw std::invalid_argument("velocity." + std::string(field) + " is " + std::to_string(value) + ", but must be " + range);
+  if (!good)
+    throw std::invalid_argument("velocity." + std::string(field) + " is " + std::to_string(value) + ", but must be " +
+                                range);
 }
 
 }  // namespace
@@ -18,6 +20,7 @@ void VelocityConfig::validate() const {
   for (int i = 0; i < 2; ++i) {
     require(min[i] <= 0.0, "min", min[i], "<= 0 m/s");
     require(max[i] >= 0.0, "max", max[i], ">= 0 m/s");
+    require(integral_share >= 0.0, "integral_share", integral_share, ">= 0");
     require(integral_limit[i] >= 0.0, "integral_limit", integral_limit[i], ">= 0 m/s");
   }
   require(max_yaw_rate >= 0.0, "max_yaw_rate", max_yaw_rate, ">= 0 rad/s");
@@ -50,8 +53,8 @@ void VelocityReference::step(const Vector2& command, double yaw_rate, const Vect
     ramped_[i] += std::clamp(wanted - ramped_[i], -change, change);
     if (!integrate) continue;
     const double error = std::clamp(ramped_[i] - filtered_[i], -config_.max_error, config_.max_error);
-    integral_[i] = std::clamp(integral_[i] + config_.integral_gain * dt * error, -config_.integral_limit[i],
-                              config_.integral_limit[i]);
+    const double limit = config_.integral_limit[i] + config_.integral_share * std::abs(ramped_[i]);
+    integral_[i] = std::clamp(integral_[i] + config_.integral_gain * dt * error, -limit, limit);
   }
 }
 

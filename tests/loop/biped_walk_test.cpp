@@ -14,8 +14,8 @@ using test::BipedRig;
 using test::push;
 using test::quiet_stand;
 
-constexpr int kSettled = 50;    // ticks
-constexpr int kSecond = 100;    // ticks
+constexpr int kSettled = 50;  // ticks
+constexpr int kSecond = 100;  // ticks
 
 user_command_t walk_command(std::int64_t seq, double vx, double vy, double yaw_rate) {
   user_command_t command{};
@@ -49,7 +49,7 @@ TEST_CASE("ItWalksAsTheOperatorWantsAndStandsAgain") {
     BipedRig rig;
     rig.tick_times(kSettled);
     rig.give(walk_command(1, c.vx, c.vy, c.yaw_rate));
-    rig.tick_times(4 * kSecond);  // ramps, and the velocity's integral
+    rig.tick_times(10 * kSecond);  // ramps, and the velocity's integral
     CHECK(rig.trace().behaviour == Behaviour::kWalk);
     const auto before = rig.simulator.truth();
     const double yaw_before = yaw_of(rig);

@@ -78,8 +78,7 @@ TEST_CASE("EveryPlanKeepsItsLimits") {
     CAPTURE(k);
     REQUIRE(plan.foothold.allFinite());
     REQUIRE(plan.swing_time >= problem.time + config().min_time_left - kExact);
-    REQUIRE(plan.swing_time <=
-            std::max(config().max_swing_time, problem.time + config().min_time_left) + kExact);
+    REQUIRE(plan.swing_time <= std::max(config().max_swing_time, problem.time + config().min_time_left) + kExact);
     REQUIRE(plan.next_swing_time >= config().min_second_time - kExact);
     REQUIRE(plan.next_swing_time <= config().max_second_time + kExact);
     if (plan.crossing == 0) {

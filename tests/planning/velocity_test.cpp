@@ -38,7 +38,7 @@ TEST_CASE("WhatTheRobotLacksOfTheVelocityIsAddedUpToALimit") {
   reference.reset(0.0);
   for (int k = 0; k < 2000; ++k) reference.step({0.5, 0.0}, 0.0, {0.4, 0.0}, 0.0, true, kDt);
   CHECK(reference.effective().x() > 0.5);
-  CHECK(std::abs(reference.effective().x() - 0.5 - c.integral_limit.x()) < kExact);
+  CHECK(std::abs(reference.effective().x() - 0.5 - c.integral_limit.x() - c.integral_share * 0.5) < kExact);
   reference.reset(0.0);
   CHECK(reference.effective() == Vector2::Zero());
 }
