@@ -44,7 +44,11 @@ def summary_card(run: Run, measured: Metrics, verdict: Verdict | None = None) ->
     ax.text(0.35, 0.58, word, fontsize=30, fontweight="bold", color="white", va="center")
     outcome = f"fell after {measured.fell_at:.2f} s" if measured.fell_at is not None else f"stood {run.duration:.1f} s"
     ax.text(2.25, 0.40, f"{configuration.title(run)}: {outcome}", fontsize=15, color="white", va="center")
-    kept = f"{len(findings) - len(verdict.violated)} of {len(findings)} limits kept" if verdict is not None else ""
+    kept = (
+        f"{len(findings) - len(verdict.violated) - len(verdict.slow)} of {len(findings)} limits kept"
+        if verdict is not None
+        else ""
+    )
     pushes = ", ".join(style.push_text(push) for push in measured.pushes[:4]) or "no push"
     ax.text(2.25, 0.80, f"{pushes}   {kept}", fontsize=9.5, color="white", va="center", alpha=0.95)
 

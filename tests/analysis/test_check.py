@@ -23,6 +23,17 @@ def test_a_limit_is_kept_up_to_its_value() -> None:
     assert judge(FIGURES, [Limit("fell", "fell", "equals", False)]).passed
 
 
+def test_what_the_machine_does_not_keep_up_with_is_told_and_fails_nothing() -> None:
+    slow = Limit("share of missed ticks", "missed", "max", 0.005, "share", machine=True)
+    verdict = judge({"missed": 0.02}, [slow])
+    assert verdict.passed
+    assert not verdict.violated
+    assert [finding.limit for finding in verdict.slow] == [slow]
+    assert verdict.as_text().startswith("slow ")
+    assert verdict.as_text().endswith("PASS: 0 limits kept; this machine was too slow for 1")
+    assert judge({"missed": 0.001}, [slow]).as_text().endswith("PASS: 1 limits kept")
+
+
 def test_what_the_log_lacks_fails_unless_it_is_optional() -> None:
     assert not judge(FIGURES, [Limit("qp", "qp.failures", "max", 0)]).passed
     verdict = judge(FIGURES, [Limit("qp", "qp.failures", "max", 0, optional=True)])
@@ -70,8 +81,9 @@ def test_standing_keeps_the_limits_and_falling_or_standing_without_states_does_n
     assert judge(measure(stand).as_dict(), limits).passed
     held = Synthetic().messages()
     held["CONTROLLER_TRACE"]["state_is_new"][100:120], held["TRUTH"]["drives_damped"][100:120] = 0, 1
-    violated = judge(measure(run_of(held)).as_dict(), limits).violated
-    assert [finding.limit.name for finding in violated] == ["ticks without a new state", "time with the drives damped"]
+    verdict = judge(measure(run_of(held)).as_dict(), limits)
+    assert [finding.limit.name for finding in verdict.violated] == ["time with the drives damped"]
+    assert [finding.limit.name for finding in verdict.slow] == ["ticks without a new state"]
     fallen = Log.from_bytes(Synthetic(fall_at=2.0, qp_failures=(50,)).log())
     violated = judge(measure(fallen.run(), fallen.report).as_dict(), limits).violated
     assert {"fell", "largest trunk tilt", "failed QPs"} <= {finding.limit.name for finding in violated}
