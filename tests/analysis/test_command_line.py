@@ -237,11 +237,6 @@ def test_silent_says_nothing(small: str, capsys: pytest.CaptureFixture[str]) -> 
 
 # ---- over LCM, with stand-ins for the C++ programs -------------------------------------------------------------------
 
-needs_network = pytest.mark.skipif(
-    not network.host_is_loopback() and network.namespace_command() is None,
-    reason="no loopback multicast and no network namespaces on this machine",
-)
-
 
 class Stance:
     """The command as a process of its own, with stand-ins for the simulator and the controller."""
@@ -288,7 +283,6 @@ def stance(tmp_path: Path) -> Stance:
     return Stance(tmp_path)
 
 
-@needs_network
 def test_run_records_a_log_and_writes_its_report(stance: Stance) -> None:
     code, out, err = stance.run("run", "--lockstep", "--duration", "0.8", "--out", str(stance.out), "--json")
     assert code == 0, err
@@ -300,14 +294,12 @@ def test_run_records_a_log_and_writes_its_report(stance: Stance) -> None:
     assert {channel.name for channel in report.channels} >= {"ROBOT_STATE", "TRUTH", "RUN_INFO_CONTROLLER"}
 
 
-@needs_network
 def test_a_fall_is_recorded_and_is_exit_1(stance: Stance) -> None:
     code, out, _ = stance.run("run", "--duration", "1", "--out", str(stance.out), "--no-report", FAKE_SIM="fall")
     assert (code, "FELL" in out) == (1, True)
     assert Log.open(stance.out / "run.lcmlog").run().field("TRUTH", "fallen").any()
 
 
-@needs_network
 @pytest.mark.parametrize(
     ("environment", "message"),
     [
@@ -331,7 +323,6 @@ def test_a_failing_program_is_one_line_with_its_own_words(
     )  # the others failed before the first state
 
 
-@needs_network
 def test_a_controller_that_says_nothing_is_given_up_after_its_time(stance: Stance) -> None:
     code = "from stance import run; run.READY_TIMEOUT = 1.0; from stance.cli import main; raise SystemExit(main())"
     prefix = [] if network.host_is_loopback() else network.namespace_command() or []
@@ -346,7 +337,6 @@ def test_a_controller_that_says_nothing_is_given_up_after_its_time(stance: Stanc
     assert "stance-controller is not ready after 1 s: it sent no RUN_INFO_CONTROLLER" in done.stderr
 
 
-@needs_network
 def test_a_run_that_never_began_leaves_what_was_there_before(stance: Stance) -> None:
     stance.out.mkdir()
     note = stance.out / "note.txt"
@@ -355,7 +345,6 @@ def test_a_run_that_never_began_leaves_what_was_there_before(stance: Stance) -> 
     assert list(stance.out.iterdir()) == [note]
 
 
-@needs_network
 def test_a_log_that_is_there_is_not_overwritten(stance: Stance) -> None:
     stance.out.mkdir()
     log = stance.out / "run.lcmlog"
@@ -365,7 +354,6 @@ def test_a_log_that_is_there_is_not_overwritten(stance: Stance) -> None:
     assert err == f"stance: {log} is there already: choose another --out, or remove it\n"
 
 
-@needs_network
 def test_ctrl_c_ends_every_process_and_leaves_a_readable_log_and_others_can_join(stance: Stance) -> None:
     process = stance.start("run", "--out", str(stance.out), FAKE_SIM="forever")
     log = stance.out / "run.lcmlog"
@@ -387,7 +375,6 @@ def test_ctrl_c_ends_every_process_and_leaves_a_readable_log_and_others_can_join
     assert stance.run("shell", "--", "true")[0] == 2
 
 
-@needs_network
 @pytest.mark.parametrize("player", ["stance replay", "lcm-logplayer"])
 def test_a_subscriber_hears_the_whole_log_byte_for_byte(player: str, stance: Stance, small: str) -> None:
     command = [sys.executable, "-m", "stance", "replay", "--silent"]
@@ -407,7 +394,6 @@ def test_a_subscriber_hears_the_whole_log_byte_for_byte(player: str, stance: Sta
     assert [one for one in heard if one[0] != "LCM_SELF_TEST"] == [one for one in written if one[0] != "LCM_SELF_TEST"]
 
 
-@needs_network
 def test_replay_publishes_over_lcm_in_its_own_network(stance: Stance, small: str) -> None:
     code, out, err = stance.run("replay", small, "--speed", "0", "--channels", "TRUTH", "ROBOT_*", "--json")
     assert code == 0, err
