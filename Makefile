@@ -7,7 +7,7 @@ JOBS ?= $(shell nproc)
 PYTHON := .venv/bin/python
 CPP = $$(find controller sim rollout tests -name '*.[ch]pp')
 
-.PHONY: help setup build test demo check check-asan check-tsan check-debug lint bench format lock clean study
+.PHONY: help setup build programs test demo check check-asan check-tsan check-debug lint bench format lock clean study
 
 help:
 	@echo "make demo    $(ROBOT) in scenario '$(SCENARIO)' over LCM: log, report, plots, verdict (ROBOT=..., SCENARIO=...)"
@@ -18,16 +18,18 @@ help:
 setup:
 	@setup/setup.sh
 
-build: setup
+build: TARGET = all
+programs: TARGET = programs
+build programs: setup
 	@cmake --preset $(PRESET) > build-$(PRESET).log 2>&1 || { cat build-$(PRESET).log; rm -f build-$(PRESET).log; exit 1; }
 	@rm -f build-$(PRESET).log
-	@cmake --build --preset $(PRESET) --parallel $(JOBS)
+	@cmake --build --preset $(PRESET) --parallel $(JOBS) --target $(TARGET)
 
 test: build
 	ctest --preset $(PRESET)
 	$(PYTHON) -m pytest
 
-demo: build
+demo: programs
 	@.venv/bin/stance run --robot $(ROBOT) --scenario $(SCENARIO) --realtime
 
 check: lint check-debug check-asan check-tsan
@@ -46,7 +48,7 @@ bench: build
 	build/release/bin/bench_force_qp
 	$(PYTHON) tests/bench/tick.py
 
-study: build
+study: programs
 	-.venv/bin/stance study --scenario stand --scales 1.0 1.1 1.5 2.0
 	-.venv/bin/stance study --scenario stand_noisy --scales 1.0 1.1 1.5 2.0 --seed 20000
 

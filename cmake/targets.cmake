@@ -34,6 +34,9 @@ function(stance_add_library name)
   set_property(GLOBAL APPEND PROPERTY STANCE_LIBRARIES ${target})
 endfunction()
 
+# What the demo needs, without tests and benchmarks.
+add_custom_target(programs)
+
 # stance_add_program(NAME SOURCES ... DEPENDS ...): an executable, installed.
 function(stance_add_program name)
   cmake_parse_arguments(ARG "" "" "SOURCES;DEPENDS" ${ARGN})
@@ -41,6 +44,7 @@ function(stance_add_program name)
   target_link_libraries(${name} PRIVATE ${ARG_DEPENDS} stance_flags)
   set_target_properties(${name} PROPERTIES INSTALL_RPATH "${STANCE_SITE_PACKAGES}/lib")  # LCM stays in its Python environment
   install(TARGETS ${name} RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
+  add_dependencies(programs ${name})
 endfunction()
 
 # stance_add_test(NAME SOURCES ... DEPENDS ... [LABELS ...]): a Catch2 binary; ctest runs it as one test.
