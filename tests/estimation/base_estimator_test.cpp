@@ -26,10 +26,6 @@ constexpr double kOdometry = 0.02;                 // of the path
 constexpr double kNeesLow = 0.4, kNeesHigh = 2.0;  // per degree of freedom
 constexpr double kExactVelocity = 1e-4;            // m/s, on exact sensors
 
-BaseEstimator make_estimator(double foot_radius = kFootRadius) {
-  return {recommended_config(), test_legs(), foot_radius};
-}
-
 /// Roll, pitch and velocity: what the controller balances by.
 using BalanceVector = Eigen::Matrix<double, 5, 1>;
 using BalanceMatrix = Eigen::Matrix<double, 5, 5>;
@@ -147,7 +143,7 @@ struct Walk {
 TEST_CASE("ExactSensorsGiveAnExactVelocity") {
   SECTION("standing") {
     SimulatedRobot robot(standing_motion(), {}, 1);
-    BaseEstimator estimator = make_estimator();
+    BaseEstimator estimator = shipped_estimator();
     const Statistics s = run(robot, estimator, 20.0);
     CHECK(s.max_velocity < kExactVelocity);
     CHECK(s.max_tilt < 1e-5);
@@ -155,7 +151,7 @@ TEST_CASE("ExactSensorsGiveAnExactVelocity") {
   }
   SECTION("walking") {
     SimulatedRobot robot(Walk{0.4}.motion(), {}, 1);
-    BaseEstimator estimator = make_estimator();
+    BaseEstimator estimator = shipped_estimator();
     const Statistics s = run(robot, estimator, 20.0, Walk::plan);
     CHECK(s.max_velocity < 5e-3);
     CHECK(s.velocity_rms() < 1e-3);
@@ -167,7 +163,7 @@ TEST_CASE("ConsumerSensorsGiveWhatTheSheetAsksWhileStanding") {
   double nees = 0.0, tilt_squares = 0.0;
   for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
     SimulatedRobot robot(standing_motion(), consumer_sensors(), seed);
-    BaseEstimator estimator = make_estimator();
+    BaseEstimator estimator = shipped_estimator();
     run(robot, estimator, 1.0);
     const Statistics s = run(robot, estimator, 59.0);
     INFO("seed " << seed);
@@ -193,7 +189,7 @@ TEST_CASE("ConsumerSensorsGiveWhatTheSheetAsksWhileWalking") {
   double nees = 0.0, tilt_squares = 0.0;
   for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
     SimulatedRobot robot(Walk{0.4}.motion(), consumer_sensors(), seed);
-    BaseEstimator estimator = make_estimator();
+    BaseEstimator estimator = shipped_estimator();
     run(robot, estimator, 2.0, Walk::plan);
     const Vector3 true_start = robot.truth().p_WB, start = estimator.state().p_WB;
     const Statistics s = run(robot, estimator, 58.0, Walk::plan);
@@ -215,7 +211,7 @@ TEST_CASE("HeightOverTheFeetIsWithinAMillimetreOnCalibratedEncoders") {
   errors.encoder_offset = 0.0;
   errors.accelerometer_bias = 0.0;
   SimulatedRobot robot(standing_motion(), errors, 1);
-  BaseEstimator estimator = make_estimator();
+  BaseEstimator estimator = shipped_estimator();
   run(robot, estimator, 1.0);
   CHECK(run(robot, estimator, 30.0).max_height < kHeightOverFoot);
 }
@@ -223,7 +219,7 @@ TEST_CASE("HeightOverTheFeetIsWithinAMillimetreOnCalibratedEncoders") {
 TEST_CASE("StatedYawSigmaGrowsWithTheYawsError") {
   for (std::uint32_t seed = 1; seed <= kSeeds; ++seed) {
     SimulatedRobot robot(standing_motion(), consumer_sensors(), seed);
-    BaseEstimator estimator = make_estimator();
+    BaseEstimator estimator = shipped_estimator();
     run(robot, estimator, 60.0);
     const double yaw_error = minus(robot.truth(), estimator.state())[kTheta + 2];
     CHECK(std::abs(yaw_error) < 3.0 * std::sqrt(estimator.covariance()(kTheta + 2, kTheta + 2)));
@@ -234,49 +230,71 @@ TEST_CASE("FeetThatRollAreMistakenForMotionOfTheTrunkWithoutTheRollingTerm") {
   Motion motion = standing_motion(0.0);
   motion.rpy = [](double t) { return Vector3(0.0, 0.15 * std::sin(4.0 * t) * (1.0 - std::exp(-t * t)), 0.0); };
   SimulatedRobot robot(motion, {}, 1), same(motion, {}, 1);
-  BaseEstimator rolling = make_estimator(), gliding = make_estimator(0.0);
+  BaseEstimator rolling = shipped_estimator();
+  BaseEstimator gliding(shipped_biped().estimator, shipped_biped().legs, 0.0);
   CHECK(run(robot, rolling, 10.0).max_velocity < kExactVelocity);
   CHECK(run(same, gliding, 10.0).max_velocity > 50.0 * kExactVelocity);
 }
 
+/// The right foot slides forward for 0.4 s while the robot stands.
+struct Slip {
+  static constexpr double kStart = 5.0, kEnd = 5.4;  // s
+  static Motion motion(double speed) {
+    Motion motion = standing_motion();
+    motion.foot = [speed](double t, int foot) {
+      FootMotion result;
+      if (foot == 1 && t > kStart && t < kEnd) result.velocity.x() = speed;
+      return result;
+    };
+    return motion;
+  }
+};
+
 TEST_CASE("FootThatSlipsIsRefusedAndDragsNothing") {
-  constexpr double kSlipStart = 5.0, kSlipEnd = 5.4;  // s
-  constexpr double kDrag = 0.012;                     // m/s
-  Motion motion = standing_motion();
-  motion.foot = [](double t, int foot) {
-    const bool slips = foot == 1 && t > kSlipStart && t < kSlipEnd;
-    FootMotion result;
-    if (slips) result.velocity.x() = 0.4;  // m/s
-    return result;
-  };
-  for (const bool noisy : {false, true}) {
-    SimulatedRobot robot(motion, noisy ? consumer_sensors() : SensorErrors{}, 3);
-    BaseEstimator estimator = make_estimator();
-    run(robot, estimator, kSlipStart);
-    const double tilt_before = run(robot, estimator, kPeriod).max_tilt;
-    Statistics slip;
-    while (robot.time() < kSlipEnd - kPeriod) {
-      const Statistics s = run(robot, estimator, kPeriod);
-      slip.max_velocity = std::max(slip.max_velocity, s.max_velocity);
-      slip.max_tilt = std::max(slip.max_tilt, s.max_tilt);
-      CHECK(estimator.slipping(1));
-      CHECK_FALSE(estimator.slipping(0));
+  constexpr double kDrag = 0.012;  // m/s
+  for (const double speed : {0.15, 0.4}) {
+    for (const bool noisy : {false, true}) {
+      CAPTURE(speed, noisy);
+      SimulatedRobot robot(Slip::motion(speed), noisy ? consumer_sensors() : SensorErrors{}, 3);
+      BaseEstimator estimator = shipped_estimator();
+      run(robot, estimator, Slip::kStart);
+      const double tilt_before = run(robot, estimator, kPeriod).max_tilt;
+      Statistics slip;
+      while (robot.time() < Slip::kEnd - kPeriod) {
+        const Statistics s = run(robot, estimator, kPeriod);
+        slip.max_velocity = std::max(slip.max_velocity, s.max_velocity);
+        slip.max_tilt = std::max(slip.max_tilt, s.max_tilt);
+        CHECK(estimator.slipping(1));
+        CHECK_FALSE(estimator.slipping(0));
+      }
+      CHECK(slip.max_velocity < kDrag);
+      CHECK(slip.max_tilt < tilt_before + 1e-3);
+      run(robot, estimator, 0.2);
+      const Statistics after = run(robot, estimator, 2.0);
+      CHECK_FALSE(estimator.slipping(1));
+      CHECK(after.max_velocity < (noisy ? kDrag : 2e-3));
+      // The foot stands anew where it came to rest.
+      CHECK((robot.truth().p_BF_W[1] - estimator.state().p_BF_W[1]).norm() < (noisy ? 0.02 : 1e-3));
     }
-    CHECK(slip.max_velocity < kDrag);
-    CHECK(slip.max_tilt < tilt_before + 1e-3);
-    run(robot, estimator, 0.2);
-    const Statistics after = run(robot, estimator, 2.0);
-    CHECK_FALSE(estimator.slipping(1));
-    CHECK(after.max_velocity < (noisy ? kDrag : 2e-3));
-    // The foot stands anew where it came to rest.
-    CHECK((robot.truth().p_BF_W[1] - estimator.state().p_BF_W[1]).norm() < (noisy ? 0.02 : 1e-3));
+  }
+}
+
+TEST_CASE("FootThatCreepsTooSlowlyForTheGateTiltsTheTrunkByLessThanFiveMillirad") {
+  constexpr double kTilt = 5e-3;  // rad
+  for (double speed = 0.01; speed < 0.15; speed += 0.01) {
+    CAPTURE(speed);
+    SimulatedRobot robot(Slip::motion(speed), {}, 1);
+    BaseEstimator estimator = shipped_estimator();
+    run(robot, estimator, Slip::kStart);
+    CHECK(run(robot, estimator, 3.0).max_tilt < kTilt);
   }
 }
 
 TEST_CASE("VelocityThatBothFeetDenyIsForgottenAfterTheTimeout") {
   for (const double blow : {20.0, 50.0, 100.0}) {  // m/s^2, felt for one period by the accelerometer alone
+    CAPTURE(blow);
     SimulatedRobot robot(standing_motion(), {}, 1);
-    BaseEstimator estimator = make_estimator();
+    BaseEstimator estimator = shipped_estimator();
     run(robot, estimator, 5.0);
     BaseEstimate estimate;
     RobotState hit = robot.next();
@@ -285,7 +303,7 @@ TEST_CASE("VelocityThatBothFeetDenyIsForgottenAfterTheTimeout") {
     CHECK((robot.truth().v_WB - estimate.v_WB).norm() > 0.8 * blow * kPeriod);
     CHECK(estimator.slipping(0));
     CHECK(estimator.slipping(1));
-    run(robot, estimator, recommended_config().slip_timeout + kPeriod);
+    run(robot, estimator, shipped_biped().estimator.slip_timeout + kPeriod);
     const Statistics after = run(robot, estimator, 1.0);
     CHECK_FALSE(estimator.slipping(0));
     CHECK_FALSE(estimator.slipping(1));
@@ -294,12 +312,27 @@ TEST_CASE("VelocityThatBothFeetDenyIsForgottenAfterTheTimeout") {
   }
 }
 
+TEST_CASE("BlowThatTheFeetDoNotDenyTiltsTheTrunkByAHundredthOfARadian") {
+  constexpr double kTilt = 0.01;                       // rad
+  for (double blow = 2.0; blow < 20.0; blow *= 1.1) {  // m/s^2, felt for one period by the accelerometer alone
+    CAPTURE(blow);
+    SimulatedRobot robot(standing_motion(), {}, 1);
+    BaseEstimator estimator = shipped_estimator();
+    run(robot, estimator, 3.0);
+    BaseEstimate estimate;
+    RobotState hit = robot.next();
+    for (SensorSample& sample : hit.samples) sample.accelerometer.x() += blow;
+    estimator.step(hit, {}, estimate);
+    CHECK(run(robot, estimator, 1.0).max_tilt < kTilt);
+  }
+}
+
 TEST_CASE("StartsFromATiltedRest") {
   Motion motion = standing_motion(0.0);
   const Vector3 rpy(0.06, -0.09, 0.0);
   motion.rpy = [rpy](double) { return rpy; };
   SimulatedRobot robot(motion, {}, 1);
-  BaseEstimator estimator = make_estimator();
+  BaseEstimator estimator = shipped_estimator();
   CHECK_FALSE(estimator.initialised());
   BaseEstimate estimate;
   const RobotState& state = robot.next();
@@ -309,7 +342,7 @@ TEST_CASE("StartsFromATiltedRest") {
   constexpr double kTolerance = 1e-9;
   CHECK((math::rpy_from_rotation(estimate.R_WB) - rpy).norm() < kTolerance);
   CHECK((estimate.p_WB - robot.truth().p_WB).norm() < kTolerance);
-  CHECK(std::abs(estimate.p_WF[0].z() - kFootRadius) < kTolerance);
+  CHECK(std::abs(estimate.p_WF[0].z() - shipped_biped().foot_radius) < kTolerance);
   CHECK((estimate.p_WF[0] + estimate.p_WF[1]).head<2>().norm() < kTolerance);
   CHECK(estimate.v_WB.norm() < kTolerance);
   CHECK(estimate.w_WB_W.norm() < kTolerance);
@@ -324,11 +357,11 @@ TEST_CASE("GroundIsUnderTheFootThatIsOn") {
     sample.joint_position[5] -= 0.3;
     sample.joint_position[6] += 0.6;
   }
-  BaseEstimator estimator = make_estimator();
+  BaseEstimator estimator = shipped_estimator();
   BaseEstimate estimate;
   estimator.step(state, {}, estimate);
-  CHECK(std::abs(estimate.p_WF[0].z() - kFootRadius) < 1e-6);
-  CHECK(estimate.p_WF[1].z() > kFootRadius + 0.01);
+  CHECK(std::abs(estimate.p_WF[0].z() - shipped_biped().foot_radius) < 1e-6);
+  CHECK(estimate.p_WF[1].z() > shipped_biped().foot_radius + 0.01);
   CHECK(std::abs(estimate.p_WF[0].y() + estimate.p_WF[1].y()) < 1e-6);
   CHECK(estimate.contact[0]);
   CHECK_FALSE(estimate.contact[1]);
@@ -336,7 +369,7 @@ TEST_CASE("GroundIsUnderTheFootThatIsOn") {
 
 TEST_CASE("ContactNeedsTheSwitchAndThePlan") {
   SimulatedRobot robot(standing_motion(0.0), {}, 1);
-  BaseEstimator estimator = make_estimator();
+  BaseEstimator estimator = shipped_estimator();
   BaseEstimate estimate;
   ContactPlan plan;
   plan.stance = {true, false};
@@ -347,7 +380,7 @@ TEST_CASE("ContactNeedsTheSwitchAndThePlan") {
 
 TEST_CASE("SwingFootsPositionIsWhereTheJointsPutIt") {
   SimulatedRobot robot(Walk{0.4}.motion(), {}, 1);
-  BaseEstimator estimator = make_estimator();
+  BaseEstimator estimator = shipped_estimator();
   BaseEstimate estimate;
   for (int k = 0; k < 500; ++k) {
     estimator.step(robot.next(), Walk::plan(robot.time()), estimate);
@@ -360,7 +393,7 @@ TEST_CASE("SwingFootsPositionIsWhereTheJointsPutIt") {
 TEST_CASE("LostStatesAreBridged") {
   constexpr int kLost = 3;
   SimulatedRobot robot(standing_motion(), {}, 1);
-  BaseEstimator estimator = make_estimator();
+  BaseEstimator estimator = shipped_estimator();
   run(robot, estimator, 10.3);
   for (int k = 0; k < kLost; ++k) robot.next();
   const Statistics after = run(robot, estimator, kPeriod);
@@ -371,7 +404,7 @@ TEST_CASE("LostStatesAreBridged") {
 
 TEST_CASE("UtimeThatJumpsIsBridgedForABoundedTime") {
   SimulatedRobot robot(standing_motion(), {}, 1);
-  BaseEstimator estimator = make_estimator();
+  BaseEstimator estimator = shipped_estimator();
   run(robot, estimator, 1.0);
   RobotState state = robot.next();
   state.utime = std::numeric_limits<std::int64_t>::max();
@@ -386,7 +419,7 @@ TEST_CASE("UtimeThatJumpsIsBridgedForABoundedTime") {
 
 TEST_CASE("SameInputGivesTheSameBits") {
   SimulatedRobot robot(Walk{0.4}.motion(), consumer_sensors(), 5);
-  BaseEstimator one = make_estimator(), other = make_estimator();
+  BaseEstimator one = shipped_estimator(), other = shipped_estimator();
   BaseEstimate a, b;
   for (int k = 0; k < 300; ++k) {
     const RobotState& state = robot.next();
@@ -402,7 +435,7 @@ TEST_CASE("SameInputGivesTheSameBits") {
 
 TEST_CASE("RotationAndCovarianceStaySoundOverMinutes") {
   SimulatedRobot robot(standing_motion(), consumer_sensors(), 2);
-  BaseEstimator estimator = make_estimator();
+  BaseEstimator estimator = shipped_estimator();
   run(robot, estimator, 200.0);
   const Matrix3& R = estimator.state().R_WB;
   CHECK((R * R.transpose() - Matrix3::Identity()).norm() < 1e-14);
@@ -410,12 +443,13 @@ TEST_CASE("RotationAndCovarianceStaySoundOverMinutes") {
 }
 
 TEST_CASE("EstimatorsConfigNamesTheFieldThatIsWrong") {
-  BaseEstimatorConfig config = recommended_config();
+  BaseEstimatorConfig config = shipped_biped().estimator;
   config.slip_gate = -3.0;
   CHECK_THROWS_WITH(config.validate(), ContainsSubstring("slip_gate = -3"));
-  config = recommended_config();
+  config = shipped_biped().estimator;
   config.foot_position_sigma = std::numeric_limits<double>::quiet_NaN();
-  CHECK_THROWS_WITH(BaseEstimator(config, test_legs(), kFootRadius), ContainsSubstring("foot_position_sigma"));
+  CHECK_THROWS_WITH(BaseEstimator(config, shipped_biped().legs, shipped_biped().foot_radius),
+                    ContainsSubstring("foot_position_sigma"));
 }
 
 }  // namespace stance::estimation::test

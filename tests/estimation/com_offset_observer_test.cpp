@@ -1,9 +1,9 @@
-#include "controller/estimation/com_offset_observer.hpp"
-
 #include <catch2/catch_test_macros.hpp>
 #include <catch2/matchers/catch_matchers_floating_point.hpp>
 #include <catch2/matchers/catch_matchers_string.hpp>
 #include <cmath>
+
+#include "tests/estimation/simulated_robot.hpp"
 
 namespace stance::estimation {
 namespace {
@@ -11,12 +11,11 @@ namespace {
 using Catch::Matchers::ContainsSubstring;
 using Catch::Matchers::WithinAbs;
 
-constexpr CentreOfMassOffsetConfig kConfig{2.0, 0.04};
-constexpr double kMass = 13.2;        // kg
-constexpr double kFootRadius = 0.02;  // m
-constexpr double kDt = 0.01;          // s
-constexpr double kOffset = 0.012;     // m
-constexpr double kConverged = 2e-4;   // m, after ten time constants, of an offset of 12 mm
+constexpr double kDt = 0.01;         // s
+constexpr double kOffset = 0.012;    // m
+constexpr double kConverged = 2e-4;  // m, after 5 s, of an offset of 12 mm
+
+const test::ShippedBiped& biped() { return test::shipped_biped(); }
 
 /// A robot that sways about the line through its feet, its heading `yaw`, and believes its centre of mass `offset` too
 /// far back.
@@ -25,7 +24,7 @@ class LeaningRobot {
   LeaningRobot(double yaw, double offset) : R_(math::rotation_z(yaw)), offset_(offset) {
     input_.yaw = yaw;
     input_.standing = true;
-    input_.p_WF = {R_ * Vector3(0.0, 0.1, kFootRadius), R_ * Vector3(0.0, -0.1, kFootRadius)};
+    input_.p_WF = {R_ * Vector3(0.0, 0.1, biped().foot_radius), R_ * Vector3(0.0, -0.1, biped().foot_radius)};
   }
 
   /// L' = m g x exactly; half of L shows as the centre of mass's motion.
@@ -33,8 +32,8 @@ class LeaningRobot {
     constexpr double kHeight = 0.75, kSway = 0.01, kRate = 3.0;  // m, m, rad/s
     time_ += kDt;
     const double x = kSway * std::cos(kRate * time_);
-    const double L = kMass * kGravity * kSway / kRate * std::sin(kRate * time_);
-    const double v = 0.5 * L / (kMass * kHeight);
+    const double L = biped().mass * kGravity * kSway / kRate * std::sin(kRate * time_);
+    const double v = 0.5 * L / (biped().mass * kHeight);
     input_.p_WC = R_ * Vector3(x - offset_, 0.02, kHeight);
     input_.v_WC = R_ * Vector3(v, 0.0, 0.0);
     input_.L_C_W = R_ * Vector3(0.3, 0.5 * L, -0.2);
@@ -59,7 +58,7 @@ Vector3 settle(CentreOfMassOffsetObserver& observer, LeaningRobot& robot) {
 
 TEST_CASE("OffsetIsFoundWhateverTheHeading") {
   for (const double yaw : {0.0, 1.0, 2.5, -1.8}) {
-    CentreOfMassOffsetObserver observer(kConfig, kMass, kFootRadius);
+    CentreOfMassOffsetObserver observer = test::shipped_offset_observer();
     LeaningRobot robot(yaw, kOffset);
     const Vector3 b = settle(observer, robot);
     CHECK((b - kOffset * Vector3(std::cos(yaw), std::sin(yaw), 0.0)).norm() < kConverged);
@@ -67,7 +66,7 @@ TEST_CASE("OffsetIsFoundWhateverTheHeading") {
 }
 
 TEST_CASE("OffsetIsFoundWithTheFeetCrossed") {
-  CentreOfMassOffsetObserver observer(kConfig, kMass, kFootRadius);
+  CentreOfMassOffsetObserver observer = test::shipped_offset_observer();
   LeaningRobot robot(0.4, kOffset);
   std::swap(robot.input().p_WF[0], robot.input().p_WF[1]);
   settle(observer, robot);
@@ -76,15 +75,15 @@ TEST_CASE("OffsetIsFoundWithTheFeetCrossed") {
 
 TEST_CASE("OffsetStaysWithinItsLimit") {
   for (const double offset : {-0.1, 0.1}) {
-    CentreOfMassOffsetObserver observer(kConfig, kMass, kFootRadius);
+    CentreOfMassOffsetObserver observer = test::shipped_offset_observer();
     LeaningRobot robot(0.0, offset);
     settle(observer, robot);
-    CHECK(observer.offset() == std::copysign(kConfig.limit, offset));
+    CHECK(observer.offset() == std::copysign(biped().com_offset_observer.limit, offset));
   }
 }
 
 TEST_CASE("OffsetIsHeldAlongTheHeadingWhileSteppingAndGoesOnFromThere") {
-  CentreOfMassOffsetObserver observer(kConfig, kMass, kFootRadius);
+  CentreOfMassOffsetObserver observer = test::shipped_offset_observer();
   LeaningRobot robot(0.0, kOffset);
   settle(observer, robot);
   const double held = observer.offset();
@@ -105,7 +104,7 @@ TEST_CASE("OffsetIsHeldAlongTheHeadingWhileSteppingAndGoesOnFromThere") {
 }
 
 TEST_CASE("FeetInOnePlaceGiveNoLine") {
-  CentreOfMassOffsetObserver observer(kConfig, kMass, kFootRadius);
+  CentreOfMassOffsetObserver observer = test::shipped_offset_observer();
   LeaningRobot robot(0.0, kOffset);
   robot.input().p_WF[1] = robot.input().p_WF[0];
   const Vector3 b = settle(observer, robot);
@@ -113,7 +112,7 @@ TEST_CASE("FeetInOnePlaceGiveNoLine") {
 }
 
 TEST_CASE("ResetForgetsTheOffset") {
-  CentreOfMassOffsetObserver observer(kConfig, kMass, kFootRadius);
+  CentreOfMassOffsetObserver observer = test::shipped_offset_observer();
   LeaningRobot robot(0.0, kOffset);
   settle(observer, robot);
   observer.reset();
@@ -121,9 +120,9 @@ TEST_CASE("ResetForgetsTheOffset") {
 }
 
 TEST_CASE("OffsetObserversConfigNamesTheFieldThatIsWrong") {
-  CHECK_THROWS_WITH(CentreOfMassOffsetObserver({-1.0, 0.04}, kMass, kFootRadius), ContainsSubstring("bandwidth = -1"));
-  CHECK_THROWS_WITH(CentreOfMassOffsetObserver({2.0, 1.0}, kMass, kFootRadius), ContainsSubstring("limit = 1"));
-  CHECK_THROWS_WITH(CentreOfMassOffsetObserver(kConfig, 0.0, kFootRadius), ContainsSubstring("mass = 0"));
+  CHECK_THROWS_WITH(CentreOfMassOffsetObserver({-1.0, 0.04}, 1.0, 0.0), ContainsSubstring("bandwidth = -1"));
+  CHECK_THROWS_WITH(CentreOfMassOffsetObserver({2.0, 1.0}, 1.0, 0.0), ContainsSubstring("limit = 1"));
+  CHECK_THROWS_WITH(CentreOfMassOffsetObserver({2.0, 0.04}, 0.0, 0.0), ContainsSubstring("mass = 0"));
 }
 
 }  // namespace stance::estimation

@@ -1,8 +1,6 @@
 // The estimator's step takes no memory: malloc itself is watched, since Eigen's own guard sees only Eigen.
 #include <catch2/catch_test_macros.hpp>
 
-#include "controller/estimation/base_estimator.hpp"
-#include "controller/estimation/com_offset_observer.hpp"
 #include "tests/estimation/simulated_robot.hpp"
 #include "tests/support/heap_calls.hpp"
 
@@ -28,8 +26,8 @@ TEST_CASE("StepTakesNoMemory") {
     return result;
   };
   SimulatedRobot robot(motion, consumer_sensors(), 1);
-  BaseEstimator estimator(recommended_config(), test_legs(), kFootRadius);
-  CentreOfMassOffsetObserver observer({2.0, 0.04}, 13.2, kFootRadius);
+  BaseEstimator estimator = shipped_estimator();
+  CentreOfMassOffsetObserver observer = shipped_offset_observer();
   BaseEstimate estimate;
   CentreOfMassOffsetInput input;
   input.standing = true;

@@ -3,6 +3,8 @@
 #include <cmath>
 #include <stdexcept>
 
+#include "controller/config/biped_config_yaml.hpp"
+
 namespace stance::estimation::test {
 namespace {
 
@@ -13,41 +15,25 @@ Vector3 gravity_W() { return {0.0, 0.0, -kGravity}; }
 
 }  // namespace
 
-BaseEstimatorConfig recommended_config() {
-  BaseEstimatorConfig c;
-  c.gyro_noise = 2e-4;
-  c.accelerometer_noise = 2e-2;
-  c.position_noise = 1e-4;
-  c.gyro_bias_noise = 2e-5;
-  c.accelerometer_bias_noise = 2e-4;
-  c.stance_foot_noise = 3e-3;
-  c.unloading_foot_noise = 0.1;
-  c.swing_foot_noise = 10.0;
-  c.foot_velocity_sigma = 0.02;
-  c.foot_position_sigma = 4e-4;
-  c.contact_ramp = 0.02;
-  c.ramp_gain = 20.0;
-  c.slip_gate = 14.0;
-  c.slip_timeout = 0.15;
-  c.slip_inflation = 100.0;
-  c.initial_tilt_sigma = 6e-3;
-  c.initial_yaw_sigma = 1e-4;
-  c.initial_velocity_sigma = 0.05;
-  c.initial_position_sigma = 1e-4;
-  c.initial_foot_sigma = 3e-3;
-  c.initial_gyro_bias_sigma = 3e-3;
-  c.initial_accelerometer_bias_sigma = 0.05;
-  return c;
+const ShippedBiped& shipped_biped() {
+  static const ShippedBiped biped = [] {
+    const config::RobotDescription robot = config::load_robot(config::share_directory() / "robots", "biped");
+    const behaviours::BipedConfig config = config::biped_config(robot);
+    return ShippedBiped{config.estimator, config.com_offset_observer,
+                        kinematics::leg_geometries(robot.model, robot.feet), robot.feet[0].radius,
+                        robot.model.total_mass};
+  }();
+  return biped;
 }
 
-std::array<kinematics::LegGeometry, kFeet> test_legs() {
-  kinematics::LegGeometry leg;
-  leg.length = {0.08, 0.26, 0.26, 0.24};
-  leg.com_offset = {0.04, 0.104, 0.104, 0.108};
-  leg.p_BL = {0.0, 0.1, -0.1};
-  std::array<kinematics::LegGeometry, kFeet> legs{leg, leg};
-  legs[1].p_BL.y() = -leg.p_BL.y();
-  return legs;
+BaseEstimator shipped_estimator() {
+  const ShippedBiped& biped = shipped_biped();
+  return {biped.estimator, biped.legs, biped.foot_radius};
+}
+
+CentreOfMassOffsetObserver shipped_offset_observer() {
+  const ShippedBiped& biped = shipped_biped();
+  return {biped.com_offset_observer, biped.mass, biped.foot_radius};
 }
 
 Motion standing_motion(double amplitude) {
@@ -79,8 +65,8 @@ SimulatedRobot::SimulatedRobot(Motion motion, const SensorErrors& errors, std::u
     : motion_(std::move(motion)), errors_(errors), random_(seed) {
   const Vector3 p_WB = motion_.p_WB(0.0);
   const Vector3 heading_offset(0.0, legs_[0].p_BL.y(), 0.0);
-  p_WF_ = {Vector3(p_WB.x(), p_WB.y(), kFootRadius) + heading_offset,
-           Vector3(p_WB.x(), p_WB.y(), kFootRadius) - heading_offset};
+  p_WF_ = {Vector3(p_WB.x(), p_WB.y(), foot_radius_) + heading_offset,
+           Vector3(p_WB.x(), p_WB.y(), foot_radius_) - heading_offset};
   truth_.p_WB = p_WB;
   truth_.R_WB = R_WB(0.0);
   truth_.v_WB = v_WB(0.0);
@@ -143,7 +129,7 @@ void SimulatedRobot::measure(SensorSample& sample) {
         const double roll = 0.5 * (q1[4 * i] + q_[4 * i]);
         const double pitch_rate = qd[1] + qd[2] + qd[3];
         const Vector3 w_link_B = w_B + Vector3(qd[0], std::cos(roll) * pitch_rate, std::sin(roll) * pitch_rate);
-        const Vector3 rolling = (R_mid * w_link_B).cross(Vector3(0.0, 0.0, kFootRadius));
+        const Vector3 rolling = (R_mid * w_link_B).cross(Vector3(0.0, 0.0, foot_radius_));
         foot_velocity_[i] = foot.velocity + (foot.contact ? rolling : Vector3::Zero());
       }
     }

@@ -8,15 +8,22 @@
 #include <random>
 
 #include "controller/estimation/base_estimator.hpp"
+#include "controller/estimation/com_offset_observer.hpp"
 
 namespace stance::estimation::test {
 
-/// The values of docs and robots for a consumer IMU and a leg of this size.
-BaseEstimatorConfig recommended_config();
+/// Of robots/biped, as the robot stands with it.
+struct ShippedBiped {
+  BaseEstimatorConfig estimator;
+  CentreOfMassOffsetConfig com_offset_observer;
+  std::array<kinematics::LegGeometry, kFeet> legs;
+  double foot_radius = 0.0;  ///< m
+  double mass = 0.0;         ///< kg
+};
+const ShippedBiped& shipped_biped();
+BaseEstimator shipped_estimator();
+CentreOfMassOffsetObserver shipped_offset_observer();
 
-/// A leg of 0.84 m, a tip of 2 cm.
-std::array<kinematics::LegGeometry, kFeet> test_legs();
-inline constexpr double kFootRadius = 0.02;     ///< m
 inline constexpr double kSamplePeriod = 0.005;  ///< s
 
 struct FootMotion {
@@ -72,7 +79,8 @@ class SimulatedRobot {
   SensorErrors errors_;
   std::mt19937 random_;
   std::normal_distribution<double> normal_;
-  std::array<kinematics::LegGeometry, kFeet> legs_ = test_legs();
+  std::array<kinematics::LegGeometry, kFeet> legs_ = shipped_biped().legs;
+  double foot_radius_ = shipped_biped().foot_radius;  ///< m
   std::array<Vector3, kFeet> foot_velocity_{Vector3::Zero(), Vector3::Zero()};
   JointVector q_ = JointVector::Zero();
   JointVector encoder_offset_ = JointVector::Zero();
