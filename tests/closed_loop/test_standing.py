@@ -1,0 +1,85 @@
+"""What README and issue claim of a standing biped, over rollouts: ten minutes, the ellipse of pushes, the demo."""
+
+from __future__ import annotations
+
+import json
+import math
+import shutil
+import subprocess
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import yaml
+from stance.check import judge, limits_file, load_limits
+from stance.log import Log
+from stance.metrics import measure
+from stance.programs import SOURCE_TREE, find_program
+from stance.study import DIRECTIONS, standing_pushes
+
+TEN_MINUTES = 600.0  # s
+MAX_TILT = math.radians(2.0)  # of the trunk, left alone
+MOMENTS = 5  # of a push, for each direction
+DEMO_SEEDS = (10_000, 10_001, 10_002)  # that no tuning has seen
+DEMO_IMPULSES = [(0.5, 0.0, 0.0), (0.0, 3.0, 0.0)]  # N s
+
+
+@pytest.fixture(scope="module", autouse=True)
+def ten_minutes() -> Iterator[subprocess.Popen[str]]:
+    """Ten minutes of standing, which take a core some twenty seconds: meanwhile the other tests go on."""
+    words = ["--robot", "biped", "--scenario", "stand", "--duration", str(TEN_MINUTES), "--json"]
+    with subprocess.Popen([str(find_program("stance-rollout")), *words], stdout=subprocess.PIPE, text=True) as process:
+        yield process
+        process.kill()
+
+
+@pytest.fixture
+def robot_that_takes_no_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The biped as it ships, but for the thresholds of its capture steps, which nothing reaches."""
+    for folder in ("robots", "sim/scenarios"):
+        shutil.copytree(SOURCE_TREE / folder, tmp_path / folder)
+    path = tmp_path / "robots/biped/biped.yaml"
+    configuration = yaml.safe_load(path.read_text())
+    configuration["controller"]["stepping"].update(capture=[0.9, 0.9], capture_pitch=1.5)
+    path.write_text(yaml.safe_dump(configuration))
+    monkeypatch.setenv("STANCE_SHARE", str(tmp_path))
+
+
+def assert_all_pushes_of_the_ellipse_are_survived() -> None:
+    trials = standing_pushes("stand", [1.0], MOMENTS)
+    assert len({(trial.direction, trial.moment) for trial in trials}) == DIRECTIONS * MOMENTS == 40
+    assert [trial for trial in trials if trial.fallen] == []
+
+
+def test_forty_pushes_on_the_ellipse_are_survived() -> None:
+    assert_all_pushes_of_the_ellipse_are_survived()
+
+
+@pytest.mark.usefixtures("robot_that_takes_no_step")
+def test_forty_pushes_on_the_ellipse_are_survived_without_a_step() -> None:
+    assert_all_pushes_of_the_ellipse_are_survived()
+
+
+@pytest.mark.parametrize("seed", DEMO_SEEDS)
+def test_the_demo_takes_both_pushes_and_keeps_its_limits(seed: int, tmp_path: Path) -> None:
+    path = tmp_path / "run.lcmlog"
+    words = ["--robot", "biped", "--scenario", "demo", "--seed", str(seed), "--log", str(path), "--json"]
+    done = subprocess.run([str(find_program("stance-rollout")), *words], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    duration = yaml.safe_load((SOURCE_TREE / "sim/scenarios/biped/demo.yaml").read_text())["duration"]
+    assert json.loads(done.stdout)["duration_s"] == pytest.approx(duration)
+    log = Log.open(path)
+    figures = measure(log.run(), log.report)
+    assert [push.impulse_W for push in figures.pushes] == [pytest.approx(impulse) for impulse in DEMO_IMPULSES]
+    limits = load_limits(limits_file("biped", "demo"))
+    assert {"fell", "trunk.tilt_max_deg"} <= {limit.metric for limit in limits}
+    verdict = judge(figures.as_dict(), limits)
+    assert verdict.passed, verdict.as_text()
+
+
+def test_it_stands_for_ten_minutes_upright_and_without_a_failed_qp(ten_minutes: subprocess.Popen[str]) -> None:
+    result = json.loads(ten_minutes.communicate()[0])
+    assert result["duration_s"] == pytest.approx(TEN_MINUTES)
+    assert not result["fallen"]
+    assert result["max_tilt_rad"] <= MAX_TILT
+    assert result["qp_failures"] == 0
