@@ -175,6 +175,27 @@ ContactVectors Simulator::planned_forces() const noexcept {
   return force_W;
 }
 
+void Simulator::move_single_body(const Wrench& push) {
+  const bool planned = plans_.valid(step_, timeout_steps_) && plans_.current.num_stages > 0;
+  for (std::size_t foot = 0; foot < num_contacts_; ++foot) {
+    if (planned && plans_.current.contact[0][foot] == 0 && !drives_damped_) {
+      single_body_->swing(foot, Eigen::Map<const kinematics::LegVector>(commands_.current.position + 4 * foot));
+    } else {
+      single_body_->stand(foot);
+    }
+  }
+  single_body_->step(planned_forces(), push);
+}
+
+/// A foot on the ground rests there, whatever the plan asks of it.
+ContactVectors Simulator::felt_by_single_body() const noexcept {
+  ContactVectors force_W = zero_contact_vectors();
+  for (std::size_t foot = 0; foot < num_contacts_; ++foot) {
+    if (single_body_->on_ground(foot)) force_W[foot] = resting_force_W_[foot];
+  }
+  return force_W;
+}
+
 void Simulator::step(Sums& sums) {
   const auto state = [](const auto& plant) { return plant.state(); };
   const rigid_body::State before = plant(state);
@@ -188,11 +209,10 @@ void Simulator::step(Sums& sums) {
                             : drive_torque(robot_.model, commands_.current, before.q, before.qd);
     world_->step(torque, push);
   } else {
-    single_body_->step(planned_forces(), push);
+    move_single_body(push);
   }
   const ContactVectors foot_force = plant([](const auto& p) { return p.foot_force_W(); });
-  // The single body's feet are on the ground whatever the plan asks of them.
-  sensors_->step(before, plant(state), world_ ? foot_force : resting_force_W_);
+  sensors_->step(before, plant(state), world_ ? foot_force : felt_by_single_body());
   body_was_on_ground_ = body_was_on_ground_ || plant([](const auto& p) { return p.body_on_ground(); });
   sums.torque += torque / kStepsPerPeriod;
   sums.push += push.force / kStepsPerPeriod;

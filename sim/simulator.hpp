@@ -87,6 +87,8 @@ class Simulator {
     return world_ ? read(*world_) : read(*single_body_);
   }
   ContactVectors planned_forces() const noexcept;
+  void move_single_body(const Wrench& push);
+  ContactVectors felt_by_single_body() const noexcept;
   static Sums no_sums() noexcept;
   void step(Sums& sums);
   Wrench push_wrench(const rigid_body::State& state, double now) const noexcept;

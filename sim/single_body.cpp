@@ -1,6 +1,7 @@
 #include "sim/single_body.hpp"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 namespace stance::sim {
@@ -44,8 +45,10 @@ SingleBody::SingleBody(const WorldSetup& setup)
   for (std::size_t leg = 0; leg < legs_.size(); ++leg) {
     last_link_pitch_[leg] = setup.initial.q.segment<3>(static_cast<Eigen::Index>(4 * leg + 1)).sum() + pitch;
   }
-  p_WG_ = p_WF_;
-  for (std::size_t i = 0; i < setup.feet.size(); ++i) p_WG_[i].z() -= setup.feet[i].radius;
+  for (std::size_t i = 0; i < legs_.size(); ++i) {
+    radius_[i] = setup.feet[i].radius;
+    ground_z_[i] = p_WF_[i].z();
+  }
   foot_force_W_.fill(Vector3::Zero());
   follow();
 }
@@ -56,11 +59,22 @@ void SingleBody::step(const ContactVectors& force_W, const Wrench& push) {
   total.moment += (state_.p_WB - p_WC).cross(push.force);
   for (std::size_t i = 0; i < legs_.size(); ++i) {
     total.force += force_W[i];
-    total.moment += (p_WG_[i] - p_WC).cross(force_W[i]);
+    total.moment += (p_WF_[i] - Vector3(0.0, 0.0, radius_[i]) - p_WC).cross(force_W[i]);
     foot_force_W_[i] = force_W[i];
+    p_WF_[i] += kPhysicsStep * v_WF_[i];
   }
   body_.step(JointVector::Zero(), total);
   follow();
+}
+
+void SingleBody::swing(std::size_t foot, const kinematics::LegVector& q) noexcept {
+  Vector3 p_BF;
+  Eigen::Matrix<double, 3, 4> J_BF;
+  kinematics::foot_in_base(legs_[foot], q, p_BF, J_BF);
+  const Vector3 left = state_.p_WB + state_.R_WB * p_BF - p_WF_[foot];
+  // The last step down ends on the ground.
+  v_WF_[foot] = left / kControlPeriod;
+  v_WF_[foot].z() = std::max(v_WF_[foot].z(), (ground_z_[foot] - p_WF_[foot].z()) / kPhysicsStep);
 }
 
 void SingleBody::follow() noexcept {
@@ -112,12 +126,12 @@ void SingleBody::move_legs() noexcept {
     Vector3 p_BF;
     Eigen::Matrix<double, 3, 4> J_BF;
     kinematics::foot_in_base(legs_[leg], q, p_BF, J_BF);
-    // The foot stands still in W, and the last link turns about its pitch axis as little as W does.
+    // The foot moves as it does in W, and the last link turns about its pitch axis as little as W does.
     const Vector3 pitch_axis_B(0.0, std::cos(q[0]), std::sin(q[0]));
     Eigen::Matrix4d constraints;
     constraints << J_BF, 0.0, 1.0, 1.0, 1.0;
     Eigen::Vector4d rates;
-    rates << -(state_.R_WB.transpose() * state_.v_WB + w_B.cross(p_BF)), -pitch_axis_B.dot(w_B);
+    rates << state_.R_WB.transpose() * (v_WF_[leg] - state_.v_WB) - w_B.cross(p_BF), -pitch_axis_B.dot(w_B);
     state_.qd.segment<4>(first) = constraints.fullPivLu().solve(rates);
   }
 }

@@ -25,12 +25,17 @@ REAL_TIME_DURATION = 3.0  # s
 RUN_ID = 1  # stance-rollout's own
 
 
-def request(out: Path, realtime: bool, duration: float) -> RunRequest:
-    return RunRequest(out=out, scenario="demo", realtime=realtime, duration=duration, seed=3, run_id=RUN_ID)
+def request(out: Path, realtime: bool, duration: float, scenario: str = "demo") -> RunRequest:
+    return RunRequest(out=out, scenario=scenario, realtime=realtime, duration=duration, seed=3, run_id=RUN_ID)
 
 
 def lockstep(out: Path) -> dict[str, Any]:
     return {"fell": record(request(out, False, LOCKSTEP_DURATION)).fell}
+
+
+def single_body(out: Path) -> dict[str, Any]:
+    """The controller's own model as the plant."""
+    return {"fell": record(request(out, False, LOCKSTEP_DURATION, "single_body")).fell}
 
 
 def lockstep_with_false_truth(out: Path) -> dict[str, Any]:
@@ -208,6 +213,7 @@ def kill_logger(out: Path) -> dict[str, Any]:
 if __name__ == "__main__":
     scene = {
         "lockstep": lockstep,
+        "single_body": single_body,
         "lockstep_with_false_truth": lockstep_with_false_truth,
         "real_time": real_time,
         "two_runs": two_runs,

@@ -94,8 +94,12 @@ def lockstep(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def rollout(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    log = tmp_path_factory.mktemp("rollout") / "run.lcmlog"
-    words = ["--robot", "biped", "--scenario", "demo", "--duration", "9", "--seed", "3", "--log", str(log)]
+    return roll_out("demo", tmp_path_factory.mktemp("rollout"))
+
+
+def roll_out(scenario: str, out: Path) -> Path:
+    log = out / "run.lcmlog"
+    words = ["--robot", "biped", "--scenario", scenario, "--duration", "9", "--seed", "3", "--log", str(log)]
     subprocess.run([str(find_program("stance-rollout")), *words], check=True, capture_output=True)
     return log
 
@@ -130,6 +134,18 @@ def test_the_rollouts_log_explains_itself(lockstep: Path, rollout: Path) -> None
     for name in ("robot", "seed", "urdf", "configuration", "scenario", "input_hash"):
         assert getattr(in_process.simulator, name) == getattr(over_lcm.simulator, name), name
     assert not Log.open(rollout).report.problems()
+
+
+def test_the_controller_balances_its_own_model_over_lcm_as_in_the_rollout(tmp_path: Path) -> None:
+    result, log = play_whole("single_body", tmp_path, (*DECISIONS, *PLANT))
+    assert result["fell"] is False
+    assert_same_decisions(log, roll_out("single_body", tmp_path))
+    run = Log.open(log).run()
+    assert np.abs(run.field("TRUTH", "push_W")).max() == pytest.approx(5.0)  # N, at 8 s
+    # The plant bears what was planned, and nothing else: a plan acts from 1 ms after its state on.
+    planned, borne = run.field("FORCE_PLAN", "force")[:, 0], run.field("TRUTH", "f_F_W")
+    expected = 0.1 * planned[:-2] + 0.9 * planned[1:-1]
+    assert borne[2 : len(expected) + 2] == pytest.approx(expected, abs=1e-9)
 
 
 def test_lockstep_over_lcm_twice_gives_the_same_bytes(lockstep: Path, tmp_path: Path) -> None:

@@ -483,6 +483,43 @@ TEST_CASE("TheSingleBodysJointsKeepTheFeetWhereTheyAre") {
   }
 }
 
+TEST_CASE("AFootOfTheSingleBodyThatThePlanLiftsFollowsTheCommandAndLands") {
+  const WorldSetup setup = test::biped_world(0.82);
+  SingleBody plant(setup);
+  const kinematics::LegVector nominal = plant.state().q.head<4>();
+  const Vector3 start = plant.foot_tips_W()[0], other = plant.foot_tips_W()[1];
+  kinematics::LegVector bent = nominal;
+  bent[2] += 0.3;
+  const auto step = [&] {  // held up at its centre of mass
+    const Vector3 weight(0.0, 0.0, setup.model.total_mass * kGravity);
+    plant.step(zero_contact_vectors(), {weight, (plant.mechanics().p_WC - plant.state().p_WB).cross(weight)});
+  };
+  for (int i = 0; i < 60; ++i) {
+    plant.swing(0, bent);
+    step();
+  }
+  rigid_body::State bent_state = plant.state();
+  bent_state.q.head<4>() = bent;
+  CHECK((plant.foot_tips_W()[0] - foot_tips(setup.model, setup.feet, bent_state)[0]).norm() < 1e-3);
+  CHECK(plant.foot_tips_W()[0].z() > start.z() + 0.02);
+  CHECK_FALSE(plant.on_ground(0));
+  CHECK(plant.on_ground(1));
+  CHECK((plant.foot_tips_W()[1] - other).norm() == 0.0);
+
+  kinematics::LegVector stretched = nominal;
+  stretched[2] -= 0.1;  // below the ground
+  for (int i = 0; i < 60; ++i) {
+    plant.swing(0, stretched);
+    step();
+  }
+  CHECK(plant.on_ground(0));
+  CHECK(std::abs(plant.foot_tips_W()[0].z() - start.z()) < 1e-9);
+  plant.stand(0);
+  const Vector3 landed = plant.foot_tips_W()[0];
+  step();
+  CHECK((plant.foot_tips_W()[0] - landed).norm() == 0.0);
+}
+
 TEST_CASE("TheOptionsPlantStandsInPlaceOfTheScenarios") {
   Run run(test::biped_scenario("stand"), {.seed = 1, .run_id = 1, .start_utime = 0, .plant = Plant::kSingleBody});
   run.simulator.advance();
