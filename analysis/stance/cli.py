@@ -219,6 +219,7 @@ def _study(options: argparse.Namespace) -> int:
             options.scales,
             options.moments,
             options.seed,
+            with_steps=not options.without_steps,
             workers=options.workers,
             progress=progress,
         )
@@ -357,6 +358,7 @@ def _parser() -> argparse.ArgumentParser:
     study.add_argument("--scales", nargs="+", type=_positive, default=[1.0], help="of the ellipse (0.8, 4) N s")
     study.add_argument("--moments", type=_count, default=5, help="pushes in each direction (default: 5)")
     study.add_argument("--seed", type=int, default=10_000, help="of the moments and the noise (default: 10000)")
+    study.add_argument("--without-steps", action="store_true", help="of a robot that never steps")
     study.add_argument("--workers", type=_count, help="rollouts at once (default: one for each core)")
 
     shell = add("shell", _shell, "A shell, or a command, in the network of a running `stance run` or `stance replay`.")

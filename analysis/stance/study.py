@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shutil
 import subprocess
 import tempfile
 from collections.abc import Callable, Sequence
@@ -26,6 +27,7 @@ SEMI_AXES = (0.8, 4.0)
 PUSH_DURATION = 0.1  # s
 FIRST_MOMENT, LAST_MOMENT = 5.0, 7.0  # s, when the estimator has settled
 AFTER = 6.0  # s, that the robot must stand after the push
+UNREACHED = {"capture": [0.9, 0.9], "capture_pitch": 1.5}  # m, rad: a robot that would step there has fallen
 
 Progress = Callable[[int, int], None]
 """called with the trials done and in all"""
@@ -72,13 +74,14 @@ def standing_pushes(
     moments: int = 5,
     seed: int = 10_000,
     robot: str = "biped",
+    with_steps: bool = True,
     workers: int | None = None,
     progress: Progress | None = None,
 ) -> list[Trial]:
     """Pushes in 8 directions on scaled ellipses, at `moments` random moments each, every one in a rollout of its own.
 
-    `seed` gives the moments, and each trial its sensors' noise. Raises StanceError where the scenario is missing and
-    RunError where a rollout does not run.
+    `seed` gives the moments, and each trial its sensors' noise. `with_steps` False: the robot as it ships, but that it
+    never steps. Raises StanceError where the scenario is missing and RunError where a rollout does not run.
     """
     random = Random(seed)
     trials = [
@@ -90,7 +93,8 @@ def standing_pushes(
     program = find_program("stance-rollout")
     done: list[Trial] = []
     with ThreadPoolExecutor(workers or os.cpu_count()) as pool, tempfile.TemporaryDirectory() as directory:
-        for trial in pool.map(lambda one: _run(program, robot, base, Path(directory), one), trials):
+        share = _share() if with_steps else _share_without_steps(robot, Path(directory))
+        for trial in pool.map(lambda one: _run(program, robot, base, Path(directory), share, one), trials):
             done.append(trial)
             if progress is not None:
                 progress(len(done), len(trials))
@@ -127,9 +131,21 @@ def as_dict(cells: Sequence[Cell], trials: Sequence[Trial]) -> dict[str, Any]:
     return {"cells": [asdict(cell) for cell in cells], "trials": [asdict(trial) for trial in trials]}
 
 
+def _share() -> Path:
+    return Path(os.environ.get("STANCE_SHARE", SOURCE_TREE))
+
+
+def _share_without_steps(robot: str, directory: Path) -> Path:
+    shutil.copytree(_share() / "robots", directory / "robots")
+    path = directory / "robots" / robot / f"{robot}.yaml"
+    configuration = yaml.safe_load(path.read_text())
+    configuration["controller"]["stepping"].update(UNREACHED)
+    path.write_text(yaml.safe_dump(configuration))
+    return directory
+
+
 def _scenario_text(robot: str, scenario: str) -> dict[str, Any]:
-    share = Path(os.environ.get("STANCE_SHARE", SOURCE_TREE))
-    path = Path(scenario) if scenario.endswith(".yaml") else share / "sim/scenarios" / robot / f"{scenario}.yaml"
+    path = Path(scenario) if scenario.endswith(".yaml") else _share() / "sim/scenarios" / robot / f"{scenario}.yaml"
     try:
         loaded = yaml.safe_load(path.read_text())
     except OSError as error:
@@ -141,14 +157,18 @@ def _scenario_text(robot: str, scenario: str) -> dict[str, Any]:
     return loaded
 
 
-def _run(program: Path, robot: str, base: dict[str, Any], directory: Path, trial: Trial) -> Trial:
+def _run(program: Path, robot: str, base: dict[str, Any], directory: Path, share: Path, trial: Trial) -> Trial:
     force = [component / PUSH_DURATION for component in trial.impulse]
     push = {"time": trial.moment, "duration": PUSH_DURATION, "force_W": [*force, 0.0], "point_B": [0.0, 0.0, 0.0]}
     scenario = directory / f"{trial.scale}_{trial.direction}_{trial.seed}.yaml"
     scenario.write_text(yaml.safe_dump({**base, "pushes": [push]}))
     words = ["--robot", robot, "--scenario", str(scenario), "--duration", str(trial.moment + AFTER)]
     done = subprocess.run(
-        [str(program), *words, "--seed", str(trial.seed), "--json"], capture_output=True, text=True, check=False
+        [str(program), *words, "--seed", str(trial.seed), "--json"],
+        env={**os.environ, "STANCE_SHARE": str(share)},
+        capture_output=True,
+        text=True,
+        check=False,
     )
     try:
         result = json.loads(done.stdout)

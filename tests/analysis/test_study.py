@@ -8,17 +8,21 @@ import sys
 from pathlib import Path
 
 import pytest
+import yaml
 from stance.cli import main
 from stance.errors import RunError, StanceError
+from stance.programs import SOURCE_TREE
 from stance.study import as_text, standing_pushes, summarise
 
 ROLLOUT = f"""#!{sys.executable}
-import json, math, sys, yaml
+import json, math, os, sys, yaml
 option = dict(zip(sys.argv[1::2], sys.argv[2::2]))
 with open(option["--scenario"]) as file:
     scenario = yaml.safe_load(file)
+with open(os.environ["STANCE_SHARE"] + "/robots/biped/biped.yaml") as file:
+    robot = yaml.safe_load(file)
 with open({{seen!r}}, "a") as file:
-    print(json.dumps([option, scenario]), file=file)
+    print(json.dumps([option, scenario, robot]), file=file)
 (push,) = scenario["pushes"]
 x, y, z = (component * push["duration"] for component in push["force_W"])
 size = math.hypot(x / 0.8, y / 4.0)
@@ -44,8 +48,8 @@ def test_each_direction_is_pushed_at_its_own_moments_with_its_own_seed(seen: Pat
     asked = [json.loads(line) for line in seen.read_text().splitlines()]
     assert len(trials) == len(asked) == 16
     assert told[-1] == (16, 16)
-    assert {int(option["--seed"]) for option, _ in asked} == set(range(500, 516))
-    for option, scenario in asked:
+    assert {int(option["--seed"]) for option, _, _ in asked} == set(range(500, 516))
+    for option, scenario, _ in asked:
         trial = trials[int(option["--seed"]) - 500]
         (push,) = scenario["pushes"]
         assert push["time"] == trial.moment
@@ -55,6 +59,18 @@ def test_each_direction_is_pushed_at_its_own_moments_with_its_own_seed(seen: Pat
     angles = {round(math.degrees(math.atan2(trial.impulse[1] / 4.0, trial.impulse[0] / 0.8))) % 360 for trial in trials}
     assert angles == set(range(0, 360, 45))
     assert standing_pushes("stand_noisy", [1.0], 2, 500) == trials
+
+
+def test_a_robot_without_steps_is_the_shipped_one_but_for_its_thresholds(seen: Path) -> None:
+    for with_steps in (True, False):
+        standing_pushes("stand", [1.0], 1, with_steps=with_steps)
+    robots = [json.loads(line)[2] for line in seen.read_text().splitlines()]
+    shipped = yaml.safe_load((SOURCE_TREE / "robots/biped/biped.yaml").read_text())
+    assert robots[0] == shipped
+    changed = robots[-1]
+    assert min(changed["controller"]["stepping"]["capture"]) > 0.5  # m, out of its reach
+    changed["controller"]["stepping"] = shipped["controller"]["stepping"]
+    assert changed == shipped
 
 
 def test_what_survived_is_counted_with_its_interval(seen: Path) -> None:

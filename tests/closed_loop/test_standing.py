@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import math
-import shutil
 import subprocess
 from collections.abc import Iterator
 from pathlib import Path
@@ -33,31 +32,11 @@ def ten_minutes() -> Iterator[subprocess.Popen[str]]:
         process.kill()
 
 
-@pytest.fixture
-def robot_that_takes_no_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The biped as it ships, but for the thresholds of its capture steps, which nothing reaches."""
-    for folder in ("robots", "sim/scenarios"):
-        shutil.copytree(SOURCE_TREE / folder, tmp_path / folder)
-    path = tmp_path / "robots/biped/biped.yaml"
-    configuration = yaml.safe_load(path.read_text())
-    configuration["controller"]["stepping"].update(capture=[0.9, 0.9], capture_pitch=1.5)
-    path.write_text(yaml.safe_dump(configuration))
-    monkeypatch.setenv("STANCE_SHARE", str(tmp_path))
-
-
-def assert_all_pushes_of_the_ellipse_are_survived() -> None:
-    trials = standing_pushes("stand", [1.0], MOMENTS)
+@pytest.mark.parametrize("with_steps", [True, False])
+def test_forty_pushes_on_the_ellipse_are_survived(with_steps: bool) -> None:
+    trials = standing_pushes("stand", [1.0], MOMENTS, with_steps=with_steps)
     assert len({(trial.direction, trial.moment) for trial in trials}) == DIRECTIONS * MOMENTS == 40
     assert [trial for trial in trials if trial.fallen] == []
-
-
-def test_forty_pushes_on_the_ellipse_are_survived() -> None:
-    assert_all_pushes_of_the_ellipse_are_survived()
-
-
-@pytest.mark.usefixtures("robot_that_takes_no_step")
-def test_forty_pushes_on_the_ellipse_are_survived_without_a_step() -> None:
-    assert_all_pushes_of_the_ellipse_are_survived()
 
 
 @pytest.mark.parametrize("seed", DEMO_SEEDS)
