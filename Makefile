@@ -49,6 +49,8 @@ bench: build
 	$(PYTHON) tests/bench/tick.py
 
 study: programs
+	-.venv/bin/stance study --scenario stand --without-steps --scales 1.0 1.1
+	-.venv/bin/stance study --scenario stand_noisy --without-steps --scales 1.0 1.1 --seed 20000
 	-.venv/bin/stance study --scenario stand --scales 1.0 1.1 1.5 2.0
 	-.venv/bin/stance study --scenario stand_noisy --scales 1.0 1.1 1.5 2.0 --seed 20000
 
