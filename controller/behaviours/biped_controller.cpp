@@ -219,6 +219,8 @@ void BipedController::plan(int periods, const RobotState& state, Trace& trace) n
     stand(now, reference);
   }
   trace.behaviour = memory_.stepping ? Behaviour::kWalk : Behaviour::kStand;
+  trace.gait = GaitTrace{};
+  if (memory_.stepping) walk_.note(trace.gait);
   trace.x = reference.x;
   trace.x_ref = reference.x_ref;
 }

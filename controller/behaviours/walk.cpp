@@ -151,9 +151,31 @@ void Walk::model() noexcept {
   }
 }
 
+void Walk::note(GaitTrace& trace) const noexcept {
+  const planning::GaitState& gait = gait_.state();
+  const bool swinging = gait.phase == planning::GaitPhase::kSingleSupport;
+  trace = GaitTrace{};
+  trace.phase = swinging ? GaitPhase::kSingleSupport : GaitPhase::kDoubleSupport;
+  trace.swing_foot = gait.swing;
+  trace.recovering = gait.recovering;
+  trace.crossing = gait.crossing;
+  trace.steps = gait.steps;
+  trace.time = gait.time;
+  trace.swing_time = gait.swing_time;
+  trace.next_swing_time = gait.next_swing_time;
+  if (swinging) {
+    const planning::SwingReference& swing = gait_.swing();
+    trace.foothold << gait.foothold, gait.foothold_z;
+    trace.swing_p = swing.p;
+    trace.swing_v = swing.v;
+  }
+  trace.velocity_wanted << velocity_.ramped(), velocity_.yaw_rate();
+  trace.slope = gait.slope;
+}
+
 QpStatus Walk::solve(ForcePlan& plan, Trace& trace) noexcept {
   const QpStatus status = qp_->solve(problem_, solution_);
-  note(solution_, trace);
+  behaviours::note(solution_, trace);
   if (status != QpStatus::kSolved) return status;
   plan.num_contacts = kFeet;
   plan.num_stages = std::min(static_cast<int>(problem_.stages.size()), kMaxPlanStages);

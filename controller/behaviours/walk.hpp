@@ -49,6 +49,9 @@ class Walk {
   /// Solves; where the status is kSolved, `plan` has the forces in W and the predicted path.
   QpStatus solve(ForcePlan& plan, Trace& trace) noexcept;
 
+  /// Writes what the gait is doing into the trace.
+  void note(GaitTrace& trace) const noexcept;
+
   const planning::Gait& gait() const noexcept { return gait_; }
   const planning::VelocityReference& velocity() const noexcept { return velocity_; }
 

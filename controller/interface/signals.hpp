@@ -137,6 +137,25 @@ struct BaseEstimate {
   double nis = 0.0;                              ///< per degree of freedom, mean over the last step's updates
 };
 
+enum class GaitPhase : std::int8_t { kStanding = 0, kDoubleSupport = 1, kSingleSupport = 2 };
+
+/// What the gait is doing; all 0 while there is none.
+struct GaitTrace {
+  GaitPhase phase = GaitPhase::kStanding;
+  int swing_foot = 0;  ///< the foot that swings, or will next
+  bool recovering = false;
+  int crossing = 0;              ///< of the foothold: 1 in front of the standing foot to its other side, -1 behind it
+  int steps = 0;                 ///< touchdowns since the gait began
+  double time = 0.0;             ///< s, since the phase began
+  double swing_time = 0.0;       ///< s, planned, of this swing or the next
+  double next_swing_time = 0.0;  ///< s, planned, of the one after
+  Vector3 foothold = Vector3::Zero();         ///< m, in W, planned, of this swing's foot tip
+  Vector3 swing_p = Vector3::Zero();          ///< m, in W, reference of the swing foot's tip
+  Vector3 swing_v = Vector3::Zero();          ///< m/s
+  Vector3 velocity_wanted = Vector3::Zero();  ///< m/s, m/s, rad/s in the heading, ramped
+  double slope = 0.0;                         ///< rise of the ground over way, forward
+};
+
 /// All that a tick decided; what it consumed stands beside it (loop/).
 struct Trace {
   SafetyMode safety = SafetyMode::kRun;
@@ -144,6 +163,7 @@ struct Trace {
   std::array<std::int64_t, kNumFaults> fault_count{};
   Behaviour behaviour = Behaviour::kStand;
   BaseEstimate estimate;
+  GaitTrace gait;
   CentroidalState x = CentroidalState::Zero();
   CentroidalState x_ref = CentroidalState::Zero();
   QpEngine qp_engine = QpEngine::kOsqpCondensed;

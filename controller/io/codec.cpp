@@ -180,6 +180,20 @@ void encode(const Header& header, const Consumed& consumed, const Trace& trace, 
     message.contact[c] = estimate.contact[c] ? 1 : 0;
   }
   message.nis = estimate.nis;
+  const GaitTrace& gait = trace.gait;
+  message.gait_phase = static_cast<std::int8_t>(gait.phase);
+  message.swing_foot = static_cast<std::int8_t>(gait.swing_foot);
+  message.recovering = gait.recovering ? 1 : 0;
+  message.crossing = static_cast<std::int8_t>(gait.crossing);
+  message.steps = gait.steps;
+  message.gait_time = gait.time;
+  message.swing_time = gait.swing_time;
+  message.next_swing_time = gait.next_swing_time;
+  copy_out(gait.foothold, message.foothold);
+  copy_out(gait.swing_p, message.swing_p);
+  copy_out(gait.swing_v, message.swing_v);
+  copy_out(gait.velocity_wanted, message.velocity_wanted);
+  message.slope = gait.slope;
   copy_out(trace.x, message.x);
   copy_out(trace.x_ref, message.x_ref);
   message.qp_engine = static_cast<std::int8_t>(trace.qp_engine);

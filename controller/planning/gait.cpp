@@ -96,8 +96,8 @@ void Gait::step(const GaitInput& input, double dt) noexcept {
     plan(input);
     const Vector3& support = state_.p_WF[static_cast<std::size_t>(state_.support())];
     const double forward = in_heading(input.yaw, state_.foothold - support.head<2>()).x();
-    swing_.step(state_.foothold, support.z() + state_.slope * forward, std::max(0.0, state_.swing_time - state_.time),
-                dt);
+    state_.foothold_z = support.z() + state_.slope * forward;
+    swing_.step(state_.foothold, state_.foothold_z, std::max(0.0, state_.swing_time - state_.time), dt);
   }
 }
 

@@ -41,6 +41,7 @@ struct GaitState {
   double next_swing_time = 0.0;        ///< s, of the one after
   double double_support = 0.0;         ///< s, of this one, or of the next
   Vector2 foothold = Vector2::Zero();  ///< m, of this swing, in W
+  double foothold_z = 0.0;             ///< m, expected there, of the foot's tip
   int crossing = 0;
   bool recovering = false;
   int steps = 0;                                                  ///< touchdowns since the start

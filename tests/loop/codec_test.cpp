@@ -336,6 +336,17 @@ TEST_CASE("EveryFieldOfATraceIsEncoded") {
   for (Vector3& p : e.p_WF) p = distinct.vector();
   e.contact = {true, false, false, true};
   e.nis = distinct.real();
+  GaitTrace& g = trace.gait;
+  g.phase = GaitPhase::kSingleSupport;
+  g.swing_foot = 1;
+  g.recovering = true;
+  g.crossing = -1;
+  g.steps = 44;
+  g.time = distinct.real();
+  g.swing_time = distinct.real();
+  g.next_swing_time = distinct.real();
+  for (Vector3* v : {&g.foothold, &g.swing_p, &g.swing_v, &g.velocity_wanted}) distinct.fill(*v);
+  g.slope = distinct.real();
   distinct.fill(trace.x);
   distinct.fill(trace.x_ref);
   trace.qp_engine = QpEngine::kOsqpSparse;
@@ -374,6 +385,19 @@ TEST_CASE("EveryFieldOfATraceIsEncoded") {
     CHECK(m.contact[c] == (e.contact[c] ? 1 : 0));
   }
   CHECK(m.nis == e.nis);
+  CHECK(m.gait_phase == stance_msgs::controller_trace_t::SINGLE_SUPPORT);
+  CHECK(m.swing_foot == 1);
+  CHECK(m.recovering == 1);
+  CHECK(m.crossing == -1);
+  CHECK(m.steps == 44);
+  CHECK(m.gait_time == g.time);
+  CHECK(m.swing_time == g.swing_time);
+  CHECK(m.next_swing_time == g.next_swing_time);
+  check_elements(g.foothold, m.foothold);
+  check_elements(g.swing_p, m.swing_p);
+  check_elements(g.swing_v, m.swing_v);
+  check_elements(g.velocity_wanted, m.velocity_wanted);
+  CHECK(m.slope == g.slope);
   check_elements(trace.x, m.x);
   check_elements(trace.x_ref, m.x_ref);
   CHECK(m.qp_engine == 1);
