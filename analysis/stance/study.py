@@ -27,7 +27,7 @@ SEMI_AXES = (0.8, 4.0)
 PUSH_DURATION = 0.1  # s
 FIRST_MOMENT, LAST_MOMENT = 5.0, 7.0  # s, when the estimator has settled
 AFTER = 6.0  # s, that the robot must stand after the push
-UNREACHED = {"capture": [0.9, 0.9], "capture_pitch": 1.5}  # m, rad: a robot that would step there has fallen
+UNREACHED = {"capture": [0.9, 0.9], "capture_pitch": 1.5, "capture_lead": 0.0}  # m, rad: a robot that would step there has fallen
 
 Progress = Callable[[int, int], None]
 """called with the trials done and in all"""

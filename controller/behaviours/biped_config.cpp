@@ -52,6 +52,7 @@ void BipedConfig::validate() const {
   require(walk.height_offset_rate > 0.0, "walk.height_offset_rate", walk.height_offset_rate, "> 0 m/s");
   require(stepping.capture.minCoeff() > 0.0, "stepping.capture's least", stepping.capture.minCoeff(), "> 0 m");
   require(stepping.capture_pitch > 0.0, "stepping.capture_pitch", stepping.capture_pitch, "> 0 rad");
+  require(stepping.capture_lead >= 0.0, "stepping.capture_lead", stepping.capture_lead, ">= 0 s");
   require(stepping.min_steps >= 1, "stepping.min_steps", stepping.min_steps, ">= 1");
   require(stepping.settled.minCoeff() > 0.0, "stepping.settled's least", stepping.settled.minCoeff(), "> 0 m");
   require(stepping.settled_feet > 0.0, "stepping.settled_feet", stepping.settled_feet, "> 0 m");
@@ -61,6 +62,9 @@ void BipedConfig::validate() const {
   require(torque_map.swing_lead >= 0.0 && torque_map.swing_lead < 0.05, "torque_map.swing_lead", torque_map.swing_lead,
           "in 0..0.05 s");
   require(torque_map.max_ankle > 0.0, "torque_map.max_ankle", torque_map.max_ankle, "> 0 m");
+  require(torque_map.max_reach > torque_map.max_ankle, "torque_map.max_reach", torque_map.max_reach, "> max_ankle");
+  require(torque_map.limit_margin >= 0.0 && torque_map.limit_margin < 0.1, "torque_map.limit_margin",
+          torque_map.limit_margin, "in 0..0.1 rad");
   require(torque_map.lead >= 0.0 && torque_map.lead < 0.05, "torque_map.lead", torque_map.lead, "in 0..0.05 s");
   require(com_offset_quiet_momentum > 0.0, "com_offset_observer.quiet_momentum", com_offset_quiet_momentum, "> 0");
 }

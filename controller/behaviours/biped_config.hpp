@@ -44,7 +44,8 @@ struct WalkConfig {
 struct SteppingConfig {
   planning::Vector2 capture =
       planning::Vector2::Zero();  ///< m, of xi from the feet's middle, in H, above which it steps
-  double capture_pitch = 0.0;     ///< rad, of the trunk, the same
+  double capture_pitch = 0.0;     ///< rad, of the trunk capture_lead on at its present rate, the same
+  double capture_lead = 0.0;      ///< s
   int min_steps = 0;              ///< before it may stand again
   planning::Vector2 settled = planning::Vector2::Zero();  ///< m, of xi from the feet's middle, below which it may
   double settled_feet = 0.0;                              ///< m, fore and aft between the feet, the same
@@ -58,8 +59,9 @@ struct TorqueMapConfig {
   double swing_kp = 0.0;       ///< 1/s^2, of the swing leg's joints
   double swing_kd = 0.0;       ///< 1/s
   double swing_lead = 0.0;     ///< s, the same as lead
-  double max_ankle =
-      0.0;  ///< m, from the hip's pitch axis to where the last link begins, above which that link stretches
+  double max_ankle = 0.0;  ///< m, from the hip's pitch axis to the last link's begin, above which that link stretches
+  double max_reach = 0.0;  ///< m, from the hip's pitch axis to the foot, of a swing leg
+  double limit_margin = 0.0;  ///< rad, that a swing leg keeps from its joints' limits
 };
 
 struct BipedConfig {

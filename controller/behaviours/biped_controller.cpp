@@ -90,7 +90,7 @@ void BipedController::step(const TickInput& input, StageClock& clock, TickOutput
   trace.qp_active = 0;
   trace.torques_clipped = 0;
   if (fresh) {
-    estimate(input.state, trace.estimate);
+    estimate(input.periods, input.state, trace.estimate);
     clock.stamp(Stage::kEstimate);
     plan(input.periods, input.state, trace);
     clock.stamp(Stage::kPlan);
@@ -160,10 +160,14 @@ bool BipedController::follows(const RobotState& state) const noexcept {
   return std::abs(elapsed_us - periods * period_us) < 0.5 * period_us;
 }
 
-void BipedController::estimate(const RobotState& state, BaseEstimate& base) noexcept {
-  if (!estimator_.initialised()) estimator_.initialise(state);
+void BipedController::estimate(int periods, const RobotState& state, BaseEstimate& base) noexcept {
+  const bool first = !estimator_.initialised();
+  if (first) estimator_.initialise(state);
   estimator_.step(state, contact_plan(), base);
 
+  const double dt = kControlPeriod * periods;
+  body_.a_WB = first ? Vector3::Zero() : Vector3((base.v_WB - body_.state.v_WB) / dt);
+  body_.wdot_WB_W = first ? Vector3::Zero() : Vector3((base.w_WB_W - body_.state.w_WB_W) / dt);
   body_.state = {base.p_WB, base.R_WB, base.v_WB, base.w_WB_W, state.now().joint_position, state.now().joint_velocity};
   rigid_body::forward_kinematics(model_, body_.state, body_.kinematics);
   rigid_body::centroidal(model_, body_.kinematics, body_.centroidal);
@@ -249,10 +253,11 @@ void BipedController::choose_behaviour(const WalkInput& now) noexcept {
   };
   // The divergent component of motion from the middle of the feet, and the feet from each other.
   const Vector2 xi = in_heading(now.p_WC + now.v_WC / walk_.gait().omega() - 0.5 * (now.p_WF[0] + now.p_WF[1]));
+  const double pitch_soon = now.rpy.y() + c.capture_lead * (cosine * now.w_WB_W.y() - sine * now.w_WB_W.x());
   const bool wanted = memory_.user_command.behaviour == Behaviour::kWalk;
   if (!memory_.stepping) {
     const bool pushed =
-        std::abs(xi.x()) > c.capture.x() || std::abs(xi.y()) > c.capture.y() || std::abs(now.rpy.y()) > c.capture_pitch;
+        std::abs(xi.x()) > c.capture.x() || std::abs(xi.y()) > c.capture.y() || std::abs(pitch_soon) > c.capture_pitch;
     if (!wanted && !pushed) return;
     const planning::GaitConfig& gait = config_.walk.gait;
     const double double_support = pushed ? gait.capture_double_support : gait.first_double_support;
@@ -265,7 +270,7 @@ void BipedController::choose_behaviour(const WalkInput& now) noexcept {
   const double apart = in_heading(now.p_WF[0] - now.p_WF[1]).x();
   const bool settled = gait.phase == planning::GaitPhase::kDoubleSupport && gait.steps >= c.min_steps &&
                        std::abs(xi.x()) < c.settled.x() && std::abs(xi.y()) < c.settled.y() &&
-                       std::abs(apart) < c.settled_feet && std::abs(now.rpy.y()) < c.settled_pitch;
+                       std::abs(apart) < c.settled_feet && std::abs(pitch_soon) < c.settled_pitch;
   if (!wanted && settled) memory_.stepping = false;
 }
 

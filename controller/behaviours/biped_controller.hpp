@@ -41,7 +41,7 @@ class BipedController {
 
   void start_run(std::int64_t run_id) noexcept;
   bool accept(const TickInput& input) noexcept;
-  void estimate(const RobotState& state, BaseEstimate& base) noexcept;
+  void estimate(int periods, const RobotState& state, BaseEstimate& base) noexcept;
   void plan(int periods, const RobotState& state, Trace& trace) noexcept;
   void stand(const WalkInput& now, TickState& reference) noexcept;
   /// From standing to stepping and back.

@@ -1,13 +1,14 @@
 #include "controller/behaviours/torque_map.hpp"
 
-#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
 namespace stance::behaviours {
 namespace {
 
-constexpr double kMinNullSum = 1e-2;  // below it the last link's angle cannot be kept by moving along n
+constexpr double kMinNullSum = 1e-2;   // below it the last link's angle cannot be kept by moving along n
+constexpr double kDifference = 0.003;  // s, between the postures whose differences are a swing leg's rates
+constexpr double kSmallest = 1e-9;     // m
 
 Vector3 pitch_axis_B(double q0) noexcept { return {0.0, std::cos(q0), std::sin(q0)}; }
 
@@ -78,37 +79,51 @@ void TorqueMap::stance(const BodyDynamics& body, int leg, const Vector3& force_W
   command.kd.segment<3>(first + 1).setConstant(inertia * config_.null_space_kd);
 }
 
+kinematics::LegVector TorqueMap::posture(int leg, const Matrix3& R_WB, const Vector3& p_BF) const noexcept {
+  const auto side = static_cast<std::size_t>(leg);
+  const kinematics::LegGeometry& geometry = legs_[side];
+  Vector3 p_LF = kinematics::leg_rotation().transpose() * (p_BF - geometry.p_BL);
+  // Within reach, along the line from the hip's pitch axis.
+  const double lateral = std::max(std::hypot(p_LF.y(), p_LF.z()), kSmallest), y = lateral - geometry.length[0];
+  const double shrink = std::min(1.0, config_.max_reach / std::max(std::hypot(p_LF.x(), y), kSmallest));
+  p_LF.x() *= shrink;
+  p_LF.tail<2>() *= (geometry.length[0] + shrink * y) / lateral;
+  kinematics::LegVector q;
+  static_cast<void>(kinematics::leg_ik(geometry, p_LF, pitch_sum(leg, p_LF, math::rpy_from_rotation(R_WB).y()), q));
+  for (int i = 0; i < 4; ++i) {
+    const rigid_body::Joint& joint = model_.joints[static_cast<std::size_t>(4 * leg + i)];
+    q[i] = std::clamp(q[i], joint.lower + config_.limit_margin, joint.upper - config_.limit_margin);
+  }
+  return q;
+}
+
 void TorqueMap::swing(const BodyDynamics& body, int leg, const planning::SwingReference& now,
                       JointCommand& command) const noexcept {
-  const auto side = static_cast<std::size_t>(leg);
   const int first = 4 * leg;
-  const double lead = config_.swing_lead;
   const rigid_body::State& state = body.state;
-  // Trunk and foot, both `lead` on.
-  const Matrix3 R_BW = (math::exp_so3(lead * state.w_WB_W) * state.R_WB).transpose();
-  const Vector3 p_WB = state.p_WB + lead * state.v_WB;
-  const Vector3 p_WF = now.p + lead * (now.v + 0.5 * lead * now.a), v_WF = now.v + lead * now.a;
-  const Vector3 w_WB_B = R_BW * state.w_WB_W;
+  // Three postures along the foot's and the trunk's ways, `swing_lead` on in the middle: where the leg can not follow,
+  // at a limit or out of reach, its rates stay those of a leg that moves along it.
+  std::array<kinematics::LegVector, 3> q;
+  for (int k = 0; k < 3; ++k) {
+    const double t = config_.swing_lead + (k - 1) * kDifference;
+    const Matrix3 R_WB = math::exp_so3(t * (state.w_WB_W + 0.5 * t * body.wdot_WB_W)) * state.R_WB;
+    const Vector3 p_BF_W = now.p - state.p_WB + t * (now.v - state.v_WB + 0.5 * t * (now.a - body.a_WB));
+    q[static_cast<std::size_t>(k)] = posture(leg, R_WB, R_WB.transpose() * p_BF_W);
+  }
+  const kinematics::LegVector qd = (q[2] - q[0]) / (2.0 * kDifference);
+  const kinematics::LegVector qdd = (q[2] - 2.0 * q[1] + q[0]) / (kDifference * kDifference);
 
-  const Vector3 p_LF = kinematics::leg_rotation().transpose() * (R_BW * (p_WF - p_WB) - legs_[side].p_BL);
-  const double trunk_pitch = math::rpy_from_rotation(R_BW.transpose()).y();
-  kinematics::LegVector q;
-  static_cast<void>(kinematics::leg_ik(legs_[side], p_LF, pitch_sum(leg, p_LF, trunk_pitch), q));
-  Vector3 p_BF;
-  Eigen::Matrix<double, 3, 4> J_BF;
-  kinematics::foot_in_base(legs_[side], q, p_BF, J_BF);
-  Eigen::Matrix4d rates;
-  rates << J_BF, 0.0, 1.0, 1.0, 1.0;
-  const Eigen::PartialPivLU<Eigen::Matrix4d> solve(rates);
-  Eigen::Vector4d velocity, acceleration;
-  velocity << R_BW * (v_WF - state.v_WB) - w_WB_B.cross(p_BF), -pitch_axis_B(q[0]).dot(w_WB_B);
-  acceleration << R_BW * now.a, 0.0;
+  rigid_body::State then = state;
+  then.q.segment<4>(first) = q[1];
+  then.qd.segment<4>(first) = qd;
+  rigid_body::VectorNu nud = rigid_body::VectorNu::Zero(6 + model_.num_joints), torque;
+  nud.head<6>() << body.wdot_WB_W, body.a_WB;
+  nud.segment<4>(6 + first) = qdd;
+  rigid_body::inverse_dynamics(model_, then, nud, torque);
+
   const auto M = body.mass_matrix.block<4, 4>(6 + first, 6 + first);
-  const kinematics::LegVector qd = solve.solve(velocity), qdd = solve.solve(acceleration);
-  if (!qd.allFinite() || !qdd.allFinite()) return;  // a leg that is straight: no gains, no torque
-
-  command.feedforward_torque.segment<4>(first) = M * qdd + body.gravity.segment<4>(6 + first);
-  command.position.segment<4>(first) = q;
+  command.feedforward_torque.segment<4>(first) = torque.segment<4>(6 + first);
+  command.position.segment<4>(first) = q[1];
   command.velocity.segment<4>(first) = qd;
   command.kp.segment<4>(first) = config_.swing_kp * M.diagonal();
   command.kd.segment<4>(first) = config_.swing_kd * M.diagonal();

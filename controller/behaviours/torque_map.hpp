@@ -17,9 +17,11 @@
 // against the world, not against the trunk: a pitching trunk then turns about its hips on legs that keep their shape,
 // far from the joints' limits.
 //
-// A swing leg follows its foot's reference, taken `swing_lead` on: position and velocity by the leg's inverse
-// kinematics, feed-forward M qdd + gravity, gains kp and kd times each joint's own inertia. Where the ankle would be
-// farther than `max_ankle` from the hip the last link stretches instead of the knee.
+// A swing leg follows its foot's reference, taken `swing_lead` on: position, velocity and acceleration by the leg's
+// inverse kinematics and its differences, feed-forward by inverse dynamics on the base's acceleration, gains kp and kd
+// times each joint's own inertia. Where the ankle would be farther than `max_ankle` from the hip the last link
+// stretches instead of the knee; a foot farther than `max_reach`, or joints beyond their range less `limit_margin`, are
+// not asked for.
 #include "controller/behaviours/biped_config.hpp"
 #include "controller/kinematics/leg.hpp"
 #include "controller/rigid_body/dynamics.hpp"
@@ -33,6 +35,8 @@ struct BodyDynamics {
   rigid_body::Centroidal centroidal;
   rigid_body::MatrixNu mass_matrix;
   rigid_body::VectorNu gravity;
+  Vector3 a_WB = Vector3::Zero();       ///< m/s^2, of the base, mean since the last tick
+  Vector3 wdot_WB_W = Vector3::Zero();  ///< rad/s^2
 };
 
 /// What a leg is to do: bear a force, or swing its foot.
@@ -54,6 +58,8 @@ class TorqueMap {
   void stance(const BodyDynamics& body, int leg, const Vector3& force_W, JointCommand& command) const noexcept;
   void swing(const BodyDynamics& body, int leg, const planning::SwingReference& reference,
              JointCommand& command) const noexcept;
+  /// Joints of a leg whose foot is at `p_BF` [m], or as near as its reach and its joints' ranges let it come.
+  kinematics::LegVector posture(int leg, const Matrix3& R_WB, const Vector3& p_BF) const noexcept;
   /// What the last link's angle q1 + q2 + q3 should be for a foot at `p_LF` [m], the trunk pitched by `trunk_pitch`
   /// [rad].
   double pitch_sum(int leg, const Vector3& p_LF, double trunk_pitch) const noexcept;

@@ -182,6 +182,7 @@ behaviours::SteppingConfig stepping(StrictYaml yaml) {
   behaviours::SteppingConfig c;
   c.capture = pair(yaml, "capture");
   c.capture_pitch = yaml.number("capture_pitch");
+  c.capture_lead = yaml.number("capture_lead");
   c.min_steps = yaml.integer("min_steps");
   c.settled = pair(yaml, "settled");
   c.settled_feet = yaml.number("settled_feet");
@@ -199,6 +200,8 @@ behaviours::TorqueMapConfig torque_map(StrictYaml yaml) {
   c.swing_kd = yaml.number("swing_kd");
   c.swing_lead = yaml.number("swing_lead");
   c.max_ankle = yaml.number("max_ankle");
+  c.max_reach = yaml.number("max_reach");
+  c.limit_margin = yaml.number("limit_margin");
   yaml.finish();
   return c;
 }

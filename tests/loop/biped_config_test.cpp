@@ -188,6 +188,8 @@ TEST_CASE("AValueOutOfRangeIsRefusedByItsName") {
       Case{"torque_map.swing_kp", "-1", "swing_kp"},
       Case{"torque_map.swing_lead", "0.05", "swing_lead"},
       Case{"torque_map.max_ankle", "0", "max_ankle"},
+      Case{"torque_map.max_reach", "0.4", "max_reach"},
+      Case{"torque_map.limit_margin", "0.1", "limit_margin"},
       Case{"torque_map.null_space_kp", "-1", "null_space_kp"},
       Case{"torque_map.null_space_kd", "-1", "null_space_kd"},
       Case{"torque_map.lead", "0.05", "lead"},

@@ -282,7 +282,7 @@ TEST_CASE("ARobotPushedOverIsFallenDampsAndStops") {
   sim::Scenario scenario = quiet_stand();
   scenario.pushes = {push(0.2, 0.0, 300.0, 0.0)};
   BipedRig rig(scenario, biped_with("controller.stepping",
-                                    "{capture: [9, 9], capture_pitch: 9, min_steps: 1, "
+                                    "{capture: [9, 9], capture_pitch: 9, capture_lead: 0, min_steps: 1, "
                                     "settled: [1, 1], settled_feet: 1, settled_pitch: 1}"));
   int ticks = 0;
   while (!rig.has(Fault::kRobotFallen) && ticks < 400) rig.tick(), ++ticks;
