@@ -61,7 +61,7 @@ int main(int argc, char** argv) {
   app.add_option("--robot", robot_name, "robots/<robot>")->required();
   app.add_option("--scenario", scenario_name, "A name below sim/scenarios/<robot>/, or a .yaml file")->required();
   app.add_option("--duration", duration, "Seconds in place of the scenario's")->check(CLI::PositiveNumber);
-  app.add_option("--seed", seed, "Of the sensors' noise")->capture_default_str();
+  app.add_option("--seed", seed, "Of the scenario's random values and of the sensors' noise")->capture_default_str();
   app.add_option("--run-id", run_id, "Stands in every message")->capture_default_str();
   app.add_option("--solver", engine, "Engine of the force QP in place of the robot's own");
   app.add_option("--plant", plant_name, "multibody or single-body, in place of the scenario's");
@@ -76,7 +76,7 @@ int main(int argc, char** argv) {
   try {
     auto robot = config::load_robot(config::share_directory() / "robots", robot_name);
     if (!engine.empty()) robot.yaml_text = with_engine(robot.yaml_text, engine);
-    const sim::Scenario scenario = sim::load_scenario(robot_name, scenario_name);
+    const sim::Scenario scenario = sim::load_scenario(robot_name, scenario_name, seed);
     sim::SimulatorOptions options;
     options.seed = seed;
     options.run_id = run_id;

@@ -50,7 +50,8 @@ int main(int argc, char** argv) {
   auto* lockstep_flag = app.add_flag("--lockstep", lockstep, "Wait for the command that answers each state");
   app.add_flag("--realtime", real_time, "On the clock's grid, waiting for nobody (default)")->excludes(lockstep_flag);
   app.add_option("--duration", duration, "Seconds in place of the scenario's")->check(CLI::PositiveNumber);
-  app.add_option("--seed", options.seed, "Of the sensors' noise")->capture_default_str();
+  app.add_option("--seed", options.seed, "Of the scenario's random values and of the sensors' noise")
+      ->capture_default_str();
   app.add_option("--plant", plant_name, "multibody or single-body, in place of the scenario's")
       ->check(CLI::IsMember({"multibody", "single-body"}));
   auto* run_id =
@@ -68,7 +69,7 @@ int main(int argc, char** argv) {
 
   try {
     const auto robot = config::load_robot(config::share_directory() / "robots", robot_name);
-    const sim::Scenario scenario = sim::load_scenario(robot_name, scenario_name);
+    const sim::Scenario scenario = sim::load_scenario(robot_name, scenario_name, options.seed);
     if (!plant_name.empty()) options.plant = sim::plant_from_name(plant_name);
     const auto periods =
         static_cast<std::int64_t>(std::llround((duration > 0.0 ? duration : scenario.duration) / kControlPeriod));

@@ -7,6 +7,14 @@
 
 namespace stance::sim {
 
+/// In [0, 1), by `key` alone: for what is drawn by its name or place, in no order (splitmix64's finaliser).
+constexpr double keyed_uniform(std::uint64_t key) {
+  key += 0x9e3779b97f4a7c15ULL;
+  key = (key ^ (key >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  key = (key ^ (key >> 27)) * 0x94d049bb133111ebULL;
+  return static_cast<double>((key ^ (key >> 31)) >> 11) * 0x1p-53;
+}
+
 class Random {
  public:
   explicit Random(std::uint64_t seed) : engine_(seed) {}

@@ -4,22 +4,17 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <sstream>
 #include <utility>
 
 #include "controller/config/robot_description.hpp"
+#include "controller/platform/text.hpp"
 #include "sim/world.hpp"
 
 namespace stance::sim {
 namespace {
 
 using config::StrictYaml;
-
-std::string to_text(double value) {
-  std::ostringstream text;
-  text << value;
-  return text.str();
-}
+using platform::to_text;
 
 double number_in(StrictYaml& yaml, const std::string& key, double lowest, double highest) {
   const double value = yaml.number(key);
@@ -124,10 +119,12 @@ std::optional<Plant> plant_from_name(const std::string& name) {
   return std::nullopt;
 }
 
-Scenario scenario_from_text(const std::string& text, const std::string& name) {
-  StrictYaml yaml = StrictYaml::parse(text, name);
+Scenario scenario_from_text(const std::string& text, const std::string& name, std::uint64_t seed) {
+  const DrawnText drawn = draw_random_values(text, name, seed);
+  StrictYaml yaml = StrictYaml::parse(drawn.text, name);
   Scenario scenario;
-  scenario.text = text;
+  scenario.text = drawn.text;
+  scenario.drawn = drawn.values;
   scenario.robot = yaml.text("robot");
   const std::string plant = yaml.text("plant");
   if (!plant_from_name(plant)) yaml.fail("plant", "is '" + plant + "', but must be multibody or single-body");
@@ -156,7 +153,7 @@ Scenario scenario_from_text(const std::string& text, const std::string& name) {
   return scenario;
 }
 
-Scenario load_scenario(const std::string& robot, const std::string& scenario) {
+Scenario load_scenario(const std::string& robot, const std::string& scenario, std::uint64_t seed) {
   std::filesystem::path file = scenario;
   if (file.extension() != ".yaml") {
     file = config::share_directory() / "sim" / "scenarios" / robot / (scenario + ".yaml");
@@ -165,7 +162,7 @@ Scenario load_scenario(const std::string& robot, const std::string& scenario) {
                                 " does not exist");
     }
   }
-  Scenario loaded = scenario_from_text(config::read_text(file), file.filename().string());
+  Scenario loaded = scenario_from_text(config::read_text(file), file.filename().string(), seed);
   if (loaded.robot != robot) {
     throw config::ConfigError(file.filename().string() + ": robot is '" + loaded.robot + "', but the run is of '" +
                               robot + "'");

@@ -1,12 +1,15 @@
 #pragma once
-// What happens in a run: sim/scenarios/<robot>/<name>.yaml, strict. Limits that a run is judged by are not here.
+// What happens in a run: sim/scenarios/<robot>/<name>.yaml, strict once its random values are drawn. Limits that a run
+// is judged by are not here.
 #include <Eigen/Core>
+#include <cstdint>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "controller/config/strict_yaml.hpp"
 #include "controller/interface/signals.hpp"
+#include "sim/random_values.hpp"
 
 namespace stance::sim {
 
@@ -59,8 +62,9 @@ struct ScheduledCommand {
 };
 
 struct Scenario {
-  std::string text;   ///< the whole file
-  std::string robot;  ///< for which it is written
+  std::string text;               ///< the whole file, as draw_random_values leaves it
+  std::vector<DrawnValue> drawn;  ///< its random values
+  std::string robot;              ///< for which it is written
   Plant plant = Plant::kMultibody;
   double duration = 0.0;           ///< s
   double friction = 0.0;           ///< mu of the ground
@@ -76,11 +80,11 @@ struct Scenario {
 inline constexpr int kMaxCommandDelaySteps = 50;
 inline constexpr int kMaxSensorDelaySteps = 20;
 
-/// Throws config::ConfigError naming `name`, the key, its value and what is allowed.
-Scenario scenario_from_text(const std::string& text, const std::string& name);
+/// `seed` draws the random values. Throws config::ConfigError naming `name`, the key, its value and what is allowed.
+Scenario scenario_from_text(const std::string& text, const std::string& name, std::uint64_t seed);
 
 /// `scenario` is a name below sim/scenarios/<robot>/ of the share directory, or a path that ends in .yaml. Throws
 /// likewise.
-Scenario load_scenario(const std::string& robot, const std::string& scenario);
+Scenario load_scenario(const std::string& robot, const std::string& scenario, std::uint64_t seed);
 
 }  // namespace stance::sim

@@ -18,7 +18,7 @@ std::string error_of(const std::string& from, const std::string& to, const std::
   REQUIRE(at != std::string::npos);
   text.replace(at, from.size(), to);
   try {
-    static_cast<void>(scenario_from_text(text, scenario + ".yaml"));
+    static_cast<void>(scenario_from_text(text, scenario + ".yaml", 1));
   } catch (const config::ConfigError& error) {
     return error.what();
   }
@@ -34,7 +34,7 @@ bool names(const std::string& message, const std::string& key) {
 
 TEST_CASE("EveryScenarioOfTheBipedLoads") {
   for (const char* name : {"demo", "stand", "stand_noisy", "single_body"}) {
-    const Scenario scenario = load_scenario("biped", name);
+    const Scenario scenario = load_scenario("biped", name, 1);
     CHECK(scenario.duration == 20.0);
     CHECK(scenario.robot == "biped");
     CHECK(scenario.text.find("duration: 20.0") != std::string::npos);
@@ -42,7 +42,7 @@ TEST_CASE("EveryScenarioOfTheBipedLoads") {
 }
 
 TEST_CASE("TheDemoPushesHalfANewtonSecondForwardAndThreeSideways") {
-  const Scenario scenario = load_scenario("biped", "demo");
+  const Scenario scenario = load_scenario("biped", "demo", 1);
   REQUIRE(scenario.pushes.size() == 2);
   CHECK((scenario.pushes[0].force_W * scenario.pushes[0].duration - Vector3(0.5, 0.0, 0.0)).norm() < 1e-12);
   CHECK((scenario.pushes[1].force_W * scenario.pushes[1].duration - Vector3(0.0, 3.0, 0.0)).norm() < 1e-12);
@@ -50,8 +50,8 @@ TEST_CASE("TheDemoPushesHalfANewtonSecondForwardAndThreeSideways") {
   CHECK(scenario.sensors.delay_steps == 1);
   CHECK(scenario.sensors.contact_delay_steps == 5);
   CHECK(scenario.sensors.noise.joint_position_resolution == 5e-4);
-  CHECK(load_scenario("biped", "stand").sensors.noise.gyro_white == 0.0);
-  CHECK(load_scenario("biped", "single_body").plant == Plant::kSingleBody);
+  CHECK(load_scenario("biped", "stand", 1).sensors.noise.gyro_white == 0.0);
+  CHECK(load_scenario("biped", "single_body", 1).plant == Plant::kSingleBody);
 }
 
 TEST_CASE("ScenarioErrorsNameTheKey") {
@@ -92,10 +92,10 @@ TEST_CASE("ASectionThatIsNoMappingIsRefusedByItsKey") {
 }
 
 TEST_CASE("AnUnknownScenarioAndAnotherRobotsAreErrors") {
-  CHECK_THROWS_AS(load_scenario("biped", "no_such"), config::ConfigError);
+  CHECK_THROWS_AS(load_scenario("biped", "no_such", 1), config::ConfigError);
   const auto file = config::share_directory() / "sim/scenarios/biped/demo.yaml";
-  CHECK_NOTHROW(load_scenario("biped", file.string()));
-  CHECK_THROWS_AS(load_scenario("catcher", file.string()), config::ConfigError);
+  CHECK_NOTHROW(load_scenario("biped", file.string(), 1));
+  CHECK_THROWS_AS(load_scenario("catcher", file.string(), 1), config::ConfigError);
 }
 
 }  // namespace stance::sim
