@@ -8,6 +8,7 @@
 namespace stance::sim {
 namespace {
 
+using kinematics::Fall;
 using stance_msgs::force_plan_t;
 using stance_msgs::joint_command_t;
 using stance_msgs::push_t;
@@ -213,7 +214,11 @@ void Simulator::step(Sums& sums) {
   }
   const ContactVectors foot_force = plant([](const auto& p) { return p.foot_force_W(); });
   sensors_->step(before, plant(state), world_ ? foot_force : felt_by_single_body());
-  body_was_on_ground_ = body_was_on_ground_ || plant([](const auto& p) { return p.body_on_ground(); });
+  const int body = plant([](const auto& p) { return p.body_on_ground(); });
+  if (body >= 0 && num_contacts_ > 0 && fall_ == Fall::kNone) {
+    fall_ = Fall::kBodyOnGround;
+    fallen_on_ = robot_.model.bodies[static_cast<std::size_t>(body)].name;
+  }
   sums.torque += torque / kStepsPerPeriod;
   sums.push += push.force / kStepsPerPeriod;
   for (std::size_t i = 0; i < num_contacts_; ++i) sums.foot_force[i] += foot_force[i] / kStepsPerPeriod;
@@ -227,13 +232,12 @@ void Simulator::advance() {
   write_messages(sums);
 }
 
-bool Simulator::has_fallen() const noexcept {
-  if (num_contacts_ == 0) return false;
-  if (truth_.fallen != 0 || body_was_on_ground_) return true;
+void Simulator::judge_fall() noexcept {
+  if (num_contacts_ == 0 || fall_ != Fall::kNone) return;
   const rigid_body::State now = plant([](const auto& p) { return p.state(); });
   const ContactVectors tips = plant([](const auto& p) { return p.foot_tips_W(); });
-  return kinematics::has_fallen(robot_.fallen, now.R_WB, now.p_WB, std::span(tips).first(num_contacts_),
-                                robot_.feet.front().radius);
+  fall_ = kinematics::fall_of(robot_.fallen, now.R_WB, now.p_WB, std::span(tips).first(num_contacts_),
+                              robot_.feet.front().radius);
 }
 
 void Simulator::write_messages(const Sums& sums) noexcept {
@@ -281,7 +285,8 @@ void Simulator::write_messages(const Sums& sums) noexcept {
   }
   copy(sums.push, truth_.push_W);
   truth_.drives_damped = drives_damped_ ? 1 : 0;
-  truth_.fallen = has_fallen() ? 1 : 0;
+  judge_fall();
+  truth_.fallen = fallen() ? 1 : 0;
   truth_.refused_stale = refused().stale;
   truth_.refused_not_finite = refused().not_finite;
   truth_.refused_order = refused().order;

@@ -13,6 +13,7 @@
 #include <stance_msgs/robot_state_t.hpp>
 #include <stance_msgs/truth_t.hpp>
 #include <stance_msgs/user_command_t.hpp>
+#include <string>
 #include <vector>
 
 #include "controller/config/robot_description.hpp"
@@ -51,7 +52,11 @@ class Simulator {
   void advance();
 
   const RefusalCounts& refused() const { return gate_.refused(); }
-  bool fallen() const { return truth_.fallen != 0; }
+  bool fallen() const { return fall_ != kinematics::Fall::kNone; }
+  /// What the robot has fallen by, first.
+  kinematics::Fall fall() const { return fall_; }
+  /// The link that the robot lies on, where its fall is of that kind; empty before.
+  const std::string& fallen_on() const { return fallen_on_; }
   double time() const { return static_cast<double>(period_) * kControlPeriod; }  ///< s, since t_0
 
  private:
@@ -92,7 +97,7 @@ class Simulator {
   static Sums no_sums() noexcept;
   void step(Sums& sums);
   Wrench push_wrench(const rigid_body::State& state, double now) const noexcept;
-  bool has_fallen() const noexcept;
+  void judge_fall() noexcept;
   void write_messages(const Sums& sums) noexcept;
 
   config::RobotDescription robot_;
@@ -114,7 +119,8 @@ class Simulator {
   std::int64_t period_ = 0;  // control periods since t_0
   std::int64_t step_ = 0;    // physics steps since t_0
   bool drives_damped_ = false;
-  bool body_was_on_ground_ = false;
+  kinematics::Fall fall_ = kinematics::Fall::kNone;
+  std::string fallen_on_;
   std::size_t next_command_ = 0;
   bool user_command_due_ = false;
   stance_msgs::robot_state_t state_{};

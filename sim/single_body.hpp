@@ -33,7 +33,7 @@ class SingleBody {
   /// Forces of the last step: those that were asked for [N].
   const ContactVectors& foot_force_W() const { return foot_force_W_; }
   const ContactVectors& foot_tips_W() const { return p_WF_; }
-  bool body_on_ground() const { return false; }
+  int body_on_ground() const { return -1; }
   Mechanics mechanics() const noexcept { return body_.mechanics(); }
 
  private:

@@ -198,7 +198,7 @@ void World::read_state() {
 
 void World::read_contacts() {
   foot_force_W_.fill(Vector3::Zero());
-  body_on_ground_ = false;
+  body_on_ground_ = -1;
   const btCollisionObject* ground = &bullet_->ground;
   for (int m = 0; m < bullet_->dispatcher.getNumManifolds(); ++m) {
     const btPersistentManifold* manifold = bullet_->dispatcher.getManifoldByIndexInternal(m);
@@ -225,7 +225,7 @@ void World::read_contacts() {
       is_foot = true;
       foot_force_W_[f] += (ground_is_second ? impulse : Vector3(-impulse)) / kPhysicsStep;
     }
-    body_on_ground_ = body_on_ground_ || !is_foot;
+    if (!is_foot) body_on_ground_ = collider->m_link + 1;
   }
 }
 

@@ -62,8 +62,8 @@ class World {
   ContactVectors foot_tips_W() const noexcept { return foot_tips(model_, feet_, state_); }
   /// Forces of the ground on the feet in W, mean over the last step [N].
   const ContactVectors& foot_force_W() const { return foot_force_W_; }
-  /// Did a body other than a foot's bear on the ground in the last step?
-  bool body_on_ground() const { return body_on_ground_; }
+  /// Index of a body other than a foot's that bore on the ground in the last step, -1 where none did.
+  int body_on_ground() const { return body_on_ground_; }
 
  private:
   struct Bullet;
@@ -76,7 +76,7 @@ class World {
   Matrix3 R_BI_ = Matrix3::Identity();  // the base's principal axes
   rigid_body::State state_;
   ContactVectors foot_force_W_{};
-  bool body_on_ground_ = false;
+  int body_on_ground_ = -1;
 };
 
 }  // namespace stance::sim

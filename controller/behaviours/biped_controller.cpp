@@ -173,8 +173,8 @@ void BipedController::estimate(int periods, const RobotState& state, BaseEstimat
   rigid_body::centroidal(model_, body_.kinematics, body_.centroidal);
   rigid_body::mass_matrix(model_, body_.state, body_.mass_matrix);
   rigid_body::gravity_torques(model_, body_.state, body_.gravity);
-  if (kinematics::has_fallen(config_.fallen, base.R_WB, base.p_WB, std::span(base.p_WF).first<kFeet>(),
-                             feet_[0].radius)) {
+  if (kinematics::fall_of(config_.fallen, base.R_WB, base.p_WB, std::span(base.p_WF).first<kFeet>(), feet_[0].radius) !=
+      kinematics::Fall::kNone) {
     ladder_.report(Fault::kRobotFallen);
   }
 }

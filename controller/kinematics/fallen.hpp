@@ -12,13 +12,18 @@ struct FallLimits {
   double min_height = 0.0;   ///< m, of B over the lowest foot's ground point
 };
 
-/// `p_WF` [m]: tips of the feet, spheres of `foot_radius`; at least one. A pose that is not a number has fallen.
-inline bool has_fallen(const FallLimits& limits, const Matrix3& R_WB, const Vector3& p_WB,
-                       std::span<const Vector3> p_WF, double foot_radius) noexcept {
+/// Why a robot has fallen; the last is for the simulator alone to see.
+enum class Fall { kNone, kTilt, kHeight, kBodyOnGround };
+
+/// By its pose. `p_WF` [m]: tips of the feet, spheres of `foot_radius`; at least one. A pose that is not a number has
+/// fallen.
+inline Fall fall_of(const FallLimits& limits, const Matrix3& R_WB, const Vector3& p_WB, std::span<const Vector3> p_WF,
+                    double foot_radius) noexcept {
   double ground = p_WF.front().z();
   for (const Vector3& tip : p_WF) ground = std::min(ground, tip.z());
   ground -= foot_radius;
-  return !(R_WB(2, 2) >= limits.min_upright && p_WB.z() - ground >= limits.min_height);
+  if (!(R_WB(2, 2) >= limits.min_upright)) return Fall::kTilt;
+  return p_WB.z() - ground >= limits.min_height ? Fall::kNone : Fall::kHeight;
 }
 
 }  // namespace stance::kinematics

@@ -298,8 +298,23 @@ TEST_CASE("ALimpRobotFallsAndTruthSaysSoForGood") {
   Run run(test::biped_scenario("stand"));
   for (int k = 0; k < 300 && !run.simulator.fallen(); ++k) run.simulator.advance();
   REQUIRE(run.simulator.fallen());
+  const kinematics::Fall fall = run.simulator.fall();
   for (int k = 0; k < 10; ++k) run.simulator.advance();
   CHECK(run.simulator.truth().fallen == 1);
+  CHECK(run.simulator.fall() == fall);
+}
+
+TEST_CASE("AFallIsToldByItsKind") {
+  using kinematics::Fall;
+  config::RobotDescription robot = test::biped();
+  Scenario scenario = test::biped_scenario("stand");
+  CHECK(Simulator(robot, scenario, {}).fall() == Fall::kNone);
+  scenario.initial.roll_pitch_yaw = {std::acos(robot.fallen.min_upright) + 0.01, 0.0, 0.0};
+  CHECK(Simulator(robot, scenario, {}).fall() == Fall::kTilt);
+  scenario.initial.roll_pitch_yaw.setZero();
+  const double height = Simulator(robot, scenario, {}).truth().p_WB[2];
+  robot.fallen.min_height = height + 0.01;
+  CHECK(Simulator(robot, scenario, {}).fall() == Fall::kHeight);
 }
 
 TEST_CASE("MassFactorsChangeThePlantAndNotTheDescription") {
