@@ -1,8 +1,8 @@
-# Install and export: find_package(stance) gives stance::force_qp and its siblings. The simulator is a program, not a library.
+# Install and export: find_package(stance) gives stance::force_qp and its siblings. Simulator and rollout are programs, not libraries.
 include(CMakePackageConfigHelpers)
 set(package_dir "${CMAKE_INSTALL_LIBDIR}/cmake/stance")
 get_property(libraries GLOBAL PROPERTY STANCE_LIBRARIES)
-list(REMOVE_ITEM libraries stance_sim)
+list(REMOVE_ITEM libraries stance_sim stance_rollout)
 install(TARGETS ${libraries} EXPORT stanceTargets ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT stanceTargets NAMESPACE stance:: DESTINATION ${package_dir})
 configure_package_config_file(cmake/stanceConfig.cmake.in "${PROJECT_BINARY_DIR}/stanceConfig.cmake" INSTALL_DESTINATION ${package_dir})

@@ -2,7 +2,6 @@
 // messages, in the same order, as over LCM in lockstep: the same results, bit for bit. Its log lacks what the wall
 // clock says there: CONTROLLER_TIMING, and the run's information each second.
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <iostream>
@@ -14,43 +13,13 @@
 #include "controller/io/log.hpp"
 #include "controller/io/run_info.hpp"
 #include "controller/loop/wall_clock.hpp"
-#include "controller/platform/hash.hpp"
 #include "controller/platform/program.hpp"
+#include "rollout/summary.hpp"
 #include "sim/node.hpp"
 #include "sim/simulator.hpp"
 
-namespace {
-
-using namespace stance;
-
-/// What a rollout tells on stdout.
-struct Summary {
-  double duration = 0.0;  ///< s, simulated
-  double wall = 0.0;      ///< s
-  bool fallen = false;
-  double max_tilt = 0.0;  ///< rad, of the trunk
-  std::int64_t qp_failures = 0;
-  std::uint64_t command_hash = platform::kHashSeed;  ///< of every JOINT_COMMAND
-};
-
-void print(const Summary& s, const sim::Simulator& simulator, bool json) {
-  const auto& truth = simulator.truth();
-  const double speed = s.wall > 0.0 ? s.duration / s.wall : 0.0;
-  if (json) {
-    std::cout << "{\"duration_s\": " << s.duration << ", \"wall_s\": " << s.wall << ", \"times_real_time\": " << speed
-              << ", \"fallen\": " << (s.fallen ? "true" : "false") << ", \"max_tilt_rad\": " << s.max_tilt
-              << ", \"qp_failures\": " << s.qp_failures << ", \"p_WB\": [" << truth.p_WB[0] << ", " << truth.p_WB[1]
-              << ", " << truth.p_WB[2] << "], \"command_hash\": \"" << std::hex << s.command_hash << "\"}\n";
-    return;
-  }
-  std::cout << (s.fallen ? "fell at " : "stood for ") << s.duration << " s; largest tilt of the trunk "
-            << s.max_tilt * 180.0 / M_PI << " deg; " << s.qp_failures << " failed QPs; " << speed
-            << " times real time; joint commands " << std::hex << s.command_hash << "\n";
-}
-
-}  // namespace
-
 int main(int argc, char** argv) {
+  using namespace stance;
   CLI::App app{"Stance's simulator and controller in one process: a scenario as fast as the machine allows."};
   app.set_version_flag("--version", STANCE_VERSION);
   std::string robot_name, scenario_name, engine, plant_name, log_file;
@@ -103,8 +72,8 @@ int main(int argc, char** argv) {
     record("RUN_INFO_SIMULATOR", sim::encode_run_info(robot, scenario, options, command_line));
     record(io::channel::kRunInfo, io::encode(io::RunInfo{robot.name, command_line, robot.urdf_text, robot.yaml_text}));
 
-    loop::NoClock clock;
-    Summary summary;
+    loop::WallClock clock;
+    rollout::Observer observer(scenario, simulator);
     const auto periods =
         static_cast<std::int64_t>(std::llround((duration > 0.0 ? duration : scenario.duration) / kControlPeriod));
     const auto start = std::chrono::steady_clock::now();
@@ -117,27 +86,23 @@ int main(int argc, char** argv) {
       io::encode(simulator.state(), state);
       record(io::channel::kRobotState, state);
       record_truth();
+      clock.start();
       static_cast<void>(ticker.offer_state(state));
       ticker.tick(1, clock);
+      clock.finish();
       record(io::channel::kForcePlan, ticker.plan().bytes());
       record(io::channel::kJointCommand, ticker.command().bytes());
       record(io::channel::kTrace, ticker.trace().bytes());
       simulator.accept(io::decoded<stance_msgs::force_plan_t>(ticker.plan().bytes()));
       simulator.accept(io::decoded<stance_msgs::joint_command_t>(ticker.command().bytes()));
       simulator.advance();
-
-      const auto& q = simulator.truth().quat_WB;
-      summary.max_tilt =
-          std::max(summary.max_tilt, std::acos(std::clamp(1.0 - 2.0 * (q[1] * q[1] + q[2] * q[2]), -1.0, 1.0)));
-      summary.command_hash = platform::hash(ticker.command().bytes(), summary.command_hash);
+      observer.period(ticker, clock.timing().cpu_us);
     }
     record_truth();
-    summary.wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-    summary.duration = simulator.time();
-    summary.fallen = simulator.fallen();
-    summary.qp_failures = ticker.output().trace.fault_count[static_cast<std::size_t>(Fault::kQpFailed)];
-    print(summary, simulator, json);
-    return summary.fallen ? 1 : 0;
+    const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+    const rollout::Summary summary = observer.summary(seed, wall);
+    std::cout << (json ? as_json(summary) : as_text(summary));
+    return summary.fallen() ? 1 : 0;
   } catch (const std::exception& error) {
     std::cerr << "stance-rollout: " << error.what() << "\n";
     return 2;

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
-#include <utility>
+#include <string_view>
 
 #include "controller/config/robot_description.hpp"
 #include "controller/platform/text.hpp"
@@ -15,6 +15,9 @@ namespace {
 
 using config::StrictYaml;
 using platform::to_text;
+
+constexpr std::array<std::string_view, 5> kBehaviourNames = {"stand", "walk", "lie-down", "track", "catch"};
+static_assert(static_cast<int>(Behaviour::kCatch) + 1 == kBehaviourNames.size());
 
 double number_in(StrictYaml& yaml, const std::string& key, double lowest, double highest) {
   const double value = yaml.number(key);
@@ -90,19 +93,14 @@ ScheduledPush push_from(StrictYaml yaml) {
 }
 
 ScheduledCommand command_from(StrictYaml yaml) {
-  constexpr std::array<std::pair<const char*, Behaviour>, 5> names{{{"stand", Behaviour::kStand},
-                                                                    {"walk", Behaviour::kWalk},
-                                                                    {"lie-down", Behaviour::kLieDown},
-                                                                    {"track", Behaviour::kTrack},
-                                                                    {"catch", Behaviour::kCatch}}};
   ScheduledCommand command;
   command.period = whole_steps(yaml, "time", kControlPeriod, 100'000'000);
   const std::string name = yaml.text("behaviour");
-  const auto* known = std::find_if(names.begin(), names.end(), [&](const auto& entry) { return entry.first == name; });
-  if (known == names.end()) {
+  const auto* known = std::find(kBehaviourNames.begin(), kBehaviourNames.end(), name);
+  if (known == kBehaviourNames.end()) {
     yaml.fail("behaviour", "is '" + name + "', but must be stand, walk, lie-down, track or catch");
   }
-  command.behaviour = known->second;
+  command.behaviour = static_cast<Behaviour>(known - kBehaviourNames.begin());
   const std::vector<double> velocity = yaml.numbers("velocity", 2);
   command.velocity = {velocity[0], velocity[1]};
   command.yaw_rate = yaml.number("yaw_rate");
@@ -112,6 +110,8 @@ ScheduledCommand command_from(StrictYaml yaml) {
 }
 
 }  // namespace
+
+const char* behaviour_name(Behaviour behaviour) { return kBehaviourNames[static_cast<std::size_t>(behaviour)].data(); }
 
 std::optional<Plant> plant_from_name(const std::string& name) {
   if (name == "multibody") return Plant::kMultibody;

@@ -18,6 +18,9 @@ enum class Plant { kMultibody, kSingleBody };
 /// "multibody" or "single-body"; nothing for another word.
 std::optional<Plant> plant_from_name(const std::string& name);
 
+/// As scenarios write it.
+const char* behaviour_name(Behaviour behaviour);
+
 /// Errors of the sensors. White ones are standard deviations of each 1 kHz sample; biases and offsets have the given
 /// size and a random sign on each axis or joint.
 struct SensorNoise {

@@ -33,7 +33,7 @@ class WallClock final : public StageClock {
   std::int64_t start_ns_ = 0, last_ns_ = 0, cpu_ns_ = 0;
 };
 
-/// For rollout and replay, where nobody asks how long a stage took.
+/// For replay, where nobody asks how long a stage took.
 class NoClock final : public StageClock {
  public:
   void stamp(Stage /*stage*/) noexcept override {}
