@@ -86,7 +86,16 @@ ScheduledPush push_from(StrictYaml yaml) {
   ScheduledPush push;
   push.time = number_in(yaml, "time", 0.0, 1e6);
   push.duration = number_in(yaml, "duration", 1e-6, 1e6);
-  push.force_W = vector(yaml, "force_W");
+  if (yaml.has("impulse")) {
+    if (yaml.has("force_W")) yaml.fail("impulse", "stands beside force_W: keep one of the two");
+    const double force = number_in(yaml, "impulse", 0.0, 1e6) / push.duration;
+    const double direction = yaml.number("direction");
+    push.force_W = {force * std::cos(direction), force * std::sin(direction), 0.0};
+  } else if (yaml.has("force_W")) {
+    push.force_W = vector(yaml, "force_W");
+  } else {
+    yaml.fail("force_W", "is missing: give it, or impulse and direction");
+  }
   push.point_B = vector(yaml, "point_B");
   yaml.finish();
   return push;

@@ -61,6 +61,8 @@ std::string StrictYaml::entry_path(const std::string& key, std::size_t index) co
   return path_ + key + "[" + std::to_string(index + 1) + "].";
 }
 
+bool StrictYaml::has(const std::string& key) const { return static_cast<bool>(node_[key]); }
+
 bool StrictYaml::is_scalar(const std::string& key) const {
   const YAML::Node value = node_[key];
   return value && value.IsScalar();
@@ -107,7 +109,7 @@ StrictYaml StrictYaml::mapping(const std::string& key) {
 
 std::vector<StrictYaml> StrictYaml::mappings(const std::string& key) {
   std::vector<StrictYaml> entries;
-  if (!node_[key]) return entries;
+  if (!has(key)) return entries;
   const YAML::Node list = require(key);
   if (!list.IsSequence()) fail(key, "must be a list");
   for (std::size_t i = 0; i < list.size(); ++i) {

@@ -22,6 +22,8 @@ class StrictYaml {
   /// stands twice in one mapping.
   static StrictYaml parse(const std::string& text, const std::string& name);
 
+  /// Does the key stand there?
+  bool has(const std::string& key) const;
   /// Does a number or a word stand there, and neither nothing nor a list nor a mapping?
   bool is_scalar(const std::string& key) const;
 

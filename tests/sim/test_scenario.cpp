@@ -1,4 +1,5 @@
 #include <catch2/catch_test_macros.hpp>
+#include <cmath>
 #include <string>
 
 #include "controller/config/strict_yaml.hpp"
@@ -72,6 +73,20 @@ TEST_CASE("ScenarioErrorsNameTheKey") {
   CHECK(names(error_of("behaviour: stand", "behaviour: stend"), "commands[1].behaviour is 'stend'"));
   CHECK(names(error_of("{time: 0.0, b", "{time: 0.005, b"), "commands[1].time"));
   CHECK(names(error_of("foot_clearance: -0.0003", "foot_clearance: -1"), "initial_state.foot_clearance"));
+}
+
+TEST_CASE("APushMayBeGivenByItsImpulseAndDirection") {
+  std::string text = text_of("demo");
+  const std::string force = "force_W: [5, 0, 0]";
+  text.replace(text.find(force), force.size(), "impulse: 6.0, direction: 2.0943951023931953");
+  const ScheduledPush push = scenario_from_text(text, "demo.yaml", 1).pushes.front();
+  CHECK((push.force_W * push.duration - Vector3(-3.0, 3.0 * std::sqrt(3.0), 0.0)).norm() < 1e-12);
+
+  CHECK(names(error_of(force, "impulse: 6.0"), "pushes[1].direction is missing"));
+  CHECK(names(error_of(force, "direction: 1.0"), "pushes[1].force_W is missing: give it, or impulse and direction"));
+  CHECK(names(error_of(force, force + ", impulse: 6.0, direction: 1.0"), "pushes[1].impulse stands beside force_W"));
+  CHECK(names(error_of(force, force + ", direction: 1.0"), "pushes[1].direction is not a known key"));
+  CHECK(names(error_of(force, "impulse: -6.0, direction: 1.0"), "pushes[1].impulse is -6"));
 }
 
 TEST_CASE("NoiseIsNoneOrAMapping") {
