@@ -42,6 +42,14 @@ int whole_steps(StrictYaml& yaml, const std::string& key, double step, int most)
   return static_cast<int>(steps);
 }
 
+/// Does `word` stand there in place of a mapping? No other word may.
+bool is_word(StrictYaml& yaml, const std::string& key, const std::string& word) {
+  if (!yaml.is_scalar(key)) return false;
+  const std::string text = yaml.text(key);
+  if (text != word) yaml.fail(key, "is '" + text + "', but must be " + word + " or a mapping");
+  return true;
+}
+
 SensorNoise noise_from(StrictYaml yaml) {
   constexpr double most = 10.0;  // of any of them: a bound that only an error of units passes
   SensorNoise noise;
@@ -63,11 +71,7 @@ SensorModel sensors_from(StrictYaml yaml) {
   sensors.accelerometer_limit = number_in(yaml, "accelerometer_limit", kGravity, 1e6);
   sensors.contact_threshold = number_in(yaml, "contact_threshold", 0.0, 1e6);
   sensors.contact_delay_steps = whole_steps(yaml, "contact_delay", kPhysicsStep, kMaxSensorDelaySteps);
-  if (!yaml.is_scalar("noise")) {
-    sensors.noise = noise_from(yaml.mapping("noise"));
-  } else if (yaml.text("noise") != "none") {
-    yaml.fail("noise", "is '" + yaml.text("noise") + "', but must be none or a mapping");
-  }
+  if (!is_word(yaml, "noise", "none")) sensors.noise = noise_from(yaml.mapping("noise"));
   yaml.finish();
   return sensors;
 }
@@ -80,6 +84,24 @@ InitialState initial_from(StrictYaml yaml) {
   initial.angular_velocity_W = vector(yaml, "angular_velocity_W");
   yaml.finish();
   return initial;
+}
+
+TerrainModel terrain_from(StrictYaml yaml) {
+  constexpr double steepest = 0.5;  // rad
+  TerrainModel terrain;
+  const std::vector<double> slope = yaml.numbers("slope", 2);
+  for (const double angle : slope) {
+    if (std::abs(angle) > steepest) yaml.fail("slope", "has " + to_text(angle) + " rad, but must be within +-0.5 rad");
+  }
+  terrain.slope = {slope[0], slope[1]};
+  if (!is_word(yaml, "tiles", "none")) {
+    StrictYaml tiles = yaml.mapping("tiles");
+    terrain.tile_size = number_in(tiles, "size", 0.05, 10.0);
+    terrain.tile_height = number_in(tiles, "height", 0.0, 1.0);
+    tiles.finish();
+  }
+  yaml.finish();
+  return terrain;
 }
 
 ScheduledPush push_from(StrictYaml yaml) {
@@ -140,6 +162,7 @@ Scenario scenario_from_text(const std::string& text, const std::string& name, st
   scenario.plant = *plant_from_name(plant);
   scenario.duration = number_in(yaml, "duration", kControlPeriod, 1e6);
   scenario.friction = number_in(yaml, "friction", 0.0, 10.0);
+  if (!is_word(yaml, "terrain", "flat")) scenario.terrain = terrain_from(yaml.mapping("terrain"));
   scenario.command_delay_steps = whole_steps(yaml, "command_latency", kPhysicsStep, kMaxCommandDelaySteps);
   StrictYaml factors = yaml.mapping("mass_factor");
   scenario.trunk_mass_factor = number_in(factors, "trunk", 0.1, 10.0);

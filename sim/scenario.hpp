@@ -10,6 +10,7 @@
 #include "controller/config/strict_yaml.hpp"
 #include "controller/interface/signals.hpp"
 #include "sim/random_values.hpp"
+#include "sim/terrain.hpp"
 
 namespace stance::sim {
 
@@ -69,8 +70,9 @@ struct Scenario {
   std::vector<DrawnValue> drawn;  ///< its random values
   std::string robot;              ///< for which it is written
   Plant plant = Plant::kMultibody;
-  double duration = 0.0;           ///< s
-  double friction = 0.0;           ///< mu of the ground
+  double duration = 0.0;  ///< s
+  double friction = 0.0;  ///< mu of the ground
+  TerrainModel terrain;
   int command_delay_steps = 0;     ///< physics steps from a state to the effect of the command that answers it
   double trunk_mass_factor = 1.0;  ///< the plant's mass and inertia over the URDF's
   double leg_mass_factor = 1.0;

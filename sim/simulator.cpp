@@ -2,8 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <span>
+#include <stdexcept>
+
+#include "sim/initial_state.hpp"
 
 namespace stance::sim {
 namespace {
@@ -35,25 +37,6 @@ rigid_body::Model with_mass_factors(rigid_body::Model model, double trunk, doubl
     model.total_mass += body.mass;
   }
   return model;
-}
-
-/// The nominal pose, the lowest foot at its clearance and W's origin amid the feet.
-rigid_body::State initial_state(const config::RobotDescription& robot, const InitialState& initial) {
-  rigid_body::State state;
-  state.q = robot.nominal_joint_position;
-  if (robot.feet.empty()) return state;
-  state.R_WB = math::rotation_from_rpy(initial.roll_pitch_yaw);
-  state.v_WB = initial.velocity_W;
-  state.w_WB_W = initial.angular_velocity_W;
-  const ContactVectors tips = foot_tips(robot.model, robot.feet, state);
-  Vector3 mean = Vector3::Zero();
-  double lowest = std::numeric_limits<double>::infinity();
-  for (std::size_t i = 0; i < robot.feet.size(); ++i) {
-    mean += tips[i] / static_cast<double>(robot.feet.size());
-    lowest = std::min(lowest, tips[i].z() - robot.feet[i].radius);
-  }
-  state.p_WB = {-mean.x(), -mean.y(), initial.foot_clearance - lowest};
-  return state;
 }
 
 }  // namespace
@@ -101,10 +84,14 @@ Simulator::Simulator(const config::RobotDescription& robot, const Scenario& scen
   setup.shapes = rigid_body::collision_shapes_from_urdf(robot_.urdf_text, robot_.model);
   setup.friction = scenario_.friction;
   setup.floating = num_contacts_ > 0;
-  setup.initial = initial_state(robot_, scenario_.initial);
+  setup.terrain = Terrain(scenario_.terrain, options_.seed);
+  setup.initial = initial_state(robot_, scenario_.initial, setup.terrain);
   if (options_.plant.value_or(scenario_.plant) == Plant::kMultibody) {
     world_.emplace(setup);
   } else {
+    if (!scenario_.terrain.is_flat()) {
+      throw std::invalid_argument("the single body stands on flat ground: give the scenario's terrain as flat");
+    }
     single_body_.emplace(setup);
   }
 

@@ -26,7 +26,7 @@
 namespace stance::sim {
 
 struct SimulatorOptions {
-  std::uint64_t seed = 1;  ///< of the sensors' noise; the scenario's random values are drawn by then
+  std::uint64_t seed = 1;  ///< of the terrain and the sensors' noise; the scenario's random values are drawn by then
   std::int64_t run_id = 1;
   std::int64_t start_utime = 0;  ///< us, stamp of t_0
   std::optional<Plant> plant;    ///< in place of the scenario's

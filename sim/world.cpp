@@ -13,6 +13,7 @@
 #include <cmath>
 
 #include "sim/bullet_conversion.hpp"
+#include "sim/terrain_shape.hpp"
 
 namespace stance::sim {
 namespace {
@@ -50,20 +51,27 @@ std::unique_ptr<btCollisionShape> make_shape(const rigid_body::CollisionShape& s
   return std::make_unique<btSphereShape>(shape.size.x());
 }
 
+std::unique_ptr<btConcaveShape> make_ground(const Terrain& terrain) {
+  if (terrain.model().has_tiles()) return std::make_unique<TerrainShape>(terrain);
+  return std::make_unique<btStaticPlaneShape>(to_bullet(terrain.normal()), 0.0);
+}
+
 }  // namespace
 
 // Declared in an order in which each part outlives those that use it: the world goes first.
 struct World::Bullet {
-  Bullet(const rigid_body::Model& model, const Vector3& base_moments, bool floating)
-      : body(model.num_joints, model.bodies[0].mass, to_bullet(base_moments), !floating, /*canSleep=*/false) {}
+  Bullet(const rigid_body::Model& model, const Terrain& terrain, const Vector3& base_moments, bool floating)
+      : ground_shape(make_ground(terrain)),
+        body(model.num_joints, model.bodies[0].mass, to_bullet(base_moments), !floating, /*canSleep=*/false) {}
 
+  SphereOnTerrain sphere_on_terrain;
   btDefaultCollisionConfiguration configuration;
   btCollisionDispatcher dispatcher{&configuration};
   btDbvtBroadphase broadphase;
   btMultiBodyConstraintSolver solver;
   std::vector<std::unique_ptr<btCollisionShape>> shapes;
-  btStaticPlaneShape plane{btVector3(0.0, 0.0, 1.0), 0.0};
-  btRigidBody ground{btRigidBody::btRigidBodyConstructionInfo(0.0, nullptr, &plane)};
+  std::unique_ptr<btConcaveShape> ground_shape;
+  btRigidBody ground{btRigidBody::btRigidBodyConstructionInfo(0.0, nullptr, ground_shape.get())};
   btMultiBody body;
   std::vector<std::unique_ptr<btMultiBodyLinkCollider>> colliders;
   std::vector<std::unique_ptr<btMultiBodyJointLimitConstraint>> stops;
@@ -74,7 +82,8 @@ World::World(const WorldSetup& setup) : model_(setup.model), feet_(setup.feet), 
   std::array<PrincipalAxes, rigid_body::kMaxBodies> axes;
   std::transform(model_.bodies.begin(), model_.bodies.begin() + model_.num_bodies(), axes.begin(), principal_axes);
   R_BI_ = axes[0].R_LI;
-  bullet_ = std::make_unique<Bullet>(model_, axes[0].moments, setup.floating);
+  bullet_ = std::make_unique<Bullet>(model_, setup.terrain, axes[0].moments, setup.floating);
+  bullet_->sphere_on_terrain.register_with(bullet_->dispatcher);
 
   btMultiBodyDynamicsWorld& world = bullet_->world;
   world.setGravity(btVector3(0.0, 0.0, -kGravity));

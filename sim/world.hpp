@@ -1,5 +1,5 @@
 #pragma once
-// The robot in Bullet: one Featherstone multibody over flat ground, double precision, stepped at 1 kHz.
+// The robot in Bullet: one Featherstone multibody over the ground, double precision, stepped at 1 kHz.
 //
 // Settings that matter: no damping of Bullet's own, gyroscopic term on, exact friction cone, contacts solved to
 // 1e-12 m/s or 50 iterations, no softness, no restitution, never asleep. The joints' ranges are stops of the physics.
@@ -10,6 +10,7 @@
 
 #include "controller/rigid_body/dynamics.hpp"
 #include "controller/rigid_body/model.hpp"
+#include "sim/terrain.hpp"
 
 namespace stance::sim {
 
@@ -27,7 +28,7 @@ struct Mechanics {
   Vector3 p_WC = Vector3::Zero();   ///< m
   Vector3 v_WC = Vector3::Zero();   ///< m/s
   Vector3 L_C_W = Vector3::Zero();  ///< kg m^2/s
-  double energy = 0.0;              ///< J, kinetic, and potential over the ground
+  double energy = 0.0;              ///< J, kinetic, and potential over W's origin
 };
 
 /// Of the tree in this state.
@@ -42,7 +43,8 @@ struct WorldSetup {
   std::vector<rigid_body::Foot> feet;  ///< at most kMaxContacts
   std::vector<rigid_body::CollisionShape> shapes;
   double friction = 0.0;  ///< between the ground and the robot
-  bool floating = true;   ///< false: the base is fixed where it starts
+  Terrain terrain;
+  bool floating = true;  ///< false: the base is fixed where it starts
   rigid_body::State initial;
 };
 

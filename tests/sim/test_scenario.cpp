@@ -89,6 +89,33 @@ TEST_CASE("APushMayBeGivenByItsImpulseAndDirection") {
   CHECK(names(error_of(force, "impulse: -6.0, direction: 1.0"), "pushes[1].impulse is -6"));
 }
 
+TEST_CASE("TerrainIsFlatOrASlopeWithOrWithoutTiles") {
+  const auto terrain = [](const std::string& value) {
+    std::string text = text_of("demo");
+    const std::string flat = "terrain: flat";
+    text.replace(text.find(flat), flat.size(), "terrain: " + value);
+    return scenario_from_text(text, "demo.yaml", 1).terrain;
+  };
+  CHECK(terrain("flat").is_flat());
+  const TerrainModel slope = terrain("{slope: [0.17, -0.1], tiles: none}");
+  CHECK(slope.slope == Eigen::Vector2d(0.17, -0.1));
+  CHECK_FALSE(slope.has_tiles());
+  const TerrainModel tiles = terrain("{slope: [0, 0], tiles: {size: 0.2, height: 0.03}}");
+  CHECK(tiles.tile_size == 0.2);
+  CHECK(tiles.tile_height == 0.03);
+  CHECK_FALSE(tiles.is_flat());
+
+  CHECK(names(error_of("terrain: flat", ""), "terrain is missing"));
+  CHECK(names(error_of("terrain: flat", "terrain: hilly"), "terrain is 'hilly', but must be flat or a mapping"));
+  CHECK(names(error_of("terrain: flat", "terrain: {slope: [0, 0]}"), "terrain.tiles is missing"));
+  CHECK(names(error_of("terrain: flat", "terrain: {tiles: none}"), "terrain.slope is missing"));
+  CHECK(names(error_of("terrain: flat", "terrain: {slope: [10, 0], tiles: none}"), "terrain.slope has 10 rad"));
+  CHECK(names(error_of("terrain: flat", "terrain: {slope: [0, 0], tiles: {size: 0, height: 0.03}}"),
+              "terrain.tiles.size is 0"));
+  CHECK(names(error_of("terrain: flat", "terrain: {slope: [0, 0], tiles: {size: 0.2, heigth: 0.03}}"),
+              "terrain.tiles.height is missing"));
+}
+
 TEST_CASE("NoiseIsNoneOrAMapping") {
   CHECK(error_of("noise: none", "noise: some", "stand") ==
         "stand.yaml: sensors.noise is 'some', but must be none or a mapping");
