@@ -125,12 +125,18 @@ World::World(const WorldSetup& setup) : model_(setup.model), feet_(setup.feet), 
   body.setMaxCoordinateVelocity(kMaxCoordinateVelocity);
   body.setMaxAppliedImpulse(kMaxImpulse);
 
+  foot_shape_.fill(-1);
   for (int i = 0; i < model_.num_bodies(); ++i) {
     const Matrix3 R_IL = axes[static_cast<std::size_t>(i)].R_LI.transpose();
     auto compound = std::make_unique<btCompoundShape>();
     for (const rigid_body::CollisionShape& shape : setup.shapes) {
       if (shape.body != i) continue;
       bullet_->shapes.push_back(make_shape(shape));
+      for (std::size_t foot = 0; foot < feet_.size(); ++foot) {
+        if (feet_[foot].body == i && shape.kind == rigid_body::ShapeKind::kSphere && shape.p_LS == feet_[foot].tip) {
+          foot_shape_[foot] = compound->getNumChildShapes();
+        }
+      }
       const Vector3 p_IS = R_IL * (shape.p_LS - model_.bodies[static_cast<std::size_t>(i)].com);
       compound->addChildShape(btTransform(to_bullet(Quaternion(Matrix3(R_IL * shape.R_LS))), to_bullet(p_IS)),
                               bullet_->shapes.back().get());
@@ -216,26 +222,28 @@ void World::read_contacts() {
     const auto* collider =
         btMultiBodyLinkCollider::upcast(ground_is_second ? manifold->getBody0() : manifold->getBody1());
     if (collider == nullptr) continue;
-    // Impulses act on the first body along the normal that leaves the second.
-    Vector3 impulse = Vector3::Zero();
-    bool bears = false;
     for (int i = 0; i < manifold->getNumContacts(); ++i) {
       const btManifoldPoint& point = manifold->getContactPoint(i);
       if (point.m_appliedImpulse <= 0.0) continue;
-      bears = true;
-      impulse += from_bullet(point.m_normalWorldOnB * point.m_appliedImpulse +
-                             point.m_lateralFrictionDir1 * point.m_appliedImpulseLateral1 +
-                             point.m_lateralFrictionDir2 * point.m_appliedImpulseLateral2);
+      const int foot = foot_of(collider->m_link + 1, ground_is_second ? point.m_index0 : point.m_index1);
+      if (foot < 0) {
+        body_on_ground_ = collider->m_link + 1;
+        continue;
+      }
+      // Impulses act on the first body along the normal that leaves the second.
+      const Vector3 impulse = from_bullet(point.m_normalWorldOnB * point.m_appliedImpulse +
+                                          point.m_lateralFrictionDir1 * point.m_appliedImpulseLateral1 +
+                                          point.m_lateralFrictionDir2 * point.m_appliedImpulseLateral2);
+      foot_force_W_[static_cast<std::size_t>(foot)] += (ground_is_second ? impulse : Vector3(-impulse)) / kPhysicsStep;
     }
-    if (!bears) continue;
-    bool is_foot = false;
-    for (std::size_t f = 0; f < feet_.size(); ++f) {
-      if (feet_[f].body != collider->m_link + 1) continue;
-      is_foot = true;
-      foot_force_W_[f] += (ground_is_second ? impulse : Vector3(-impulse)) / kPhysicsStep;
-    }
-    if (!is_foot) body_on_ground_ = collider->m_link + 1;
   }
+}
+
+int World::foot_of(int body, int shape) const noexcept {
+  for (std::size_t foot = 0; foot < feet_.size(); ++foot) {
+    if (feet_[foot].body == body && foot_shape_[foot] == shape) return static_cast<int>(foot);
+  }
+  return -1;
 }
 
 Mechanics mechanics(const rigid_body::Model& model, const rigid_body::State& state) noexcept {

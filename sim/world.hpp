@@ -3,8 +3,9 @@
 //
 // Settings that matter: no damping of Bullet's own, gyroscopic term on, exact friction cone, contacts solved to
 // 1e-12 m/s or 50 iterations, no softness, no restitution, never asleep. The joints' ranges are stops of the physics.
-// Every body with a collision shape in the URDF meets the ground and the other bodies: of the biped, the trunk and the
-// feet. Its legs have none yet, and pass through one another.
+// Every body meets the ground, and the other bodies but its neighbours in the tree, with the collision shapes of the
+// URDF.
+#include <array>
 #include <memory>
 #include <vector>
 
@@ -42,7 +43,7 @@ struct WorldSetup {
   rigid_body::Model model;
   std::vector<rigid_body::Foot> feet;  ///< at most kMaxContacts
   std::vector<rigid_body::CollisionShape> shapes;
-  double friction = 0.0;  ///< between the ground and the robot
+  double friction = 0.0;  ///< between the ground and the robot; between its bodies, the square
   Terrain terrain;
   bool floating = true;  ///< false: the base is fixed where it starts
   rigid_body::State initial;
@@ -64,13 +65,15 @@ class World {
   ContactVectors foot_tips_W() const noexcept { return foot_tips(model_, feet_, state_); }
   /// Forces of the ground on the feet in W, mean over the last step [N].
   const ContactVectors& foot_force_W() const { return foot_force_W_; }
-  /// Index of a body other than a foot's that bore on the ground in the last step, -1 where none did.
+  /// Index of a body that bore on the ground in the last step with more than its foot, -1 where none did.
   int body_on_ground() const { return body_on_ground_; }
 
  private:
   struct Bullet;
   void read_state();
   void read_contacts();
+  /// Whose ball the body's shape is; -1 for what is no foot's.
+  int foot_of(int body, int shape) const noexcept;
 
   rigid_body::Model model_;
   std::vector<rigid_body::Foot> feet_;
@@ -78,6 +81,7 @@ class World {
   Matrix3 R_BI_ = Matrix3::Identity();  // the base's principal axes
   rigid_body::State state_;
   ContactVectors foot_force_W_{};
+  std::array<int, kMaxContacts> foot_shape_{};  // of each foot's ball among its body's shapes
   int body_on_ground_ = -1;
 };
 

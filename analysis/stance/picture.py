@@ -260,6 +260,7 @@ def _depth(view: str) -> int:
 def _body(ax: Axes, body: Robot, pose: Pose, view: str, alpha: float, order: int) -> None:
     plane = _plane(view)
     frames = body.forward(pose.q, pose.T_WB)
+    feet = {name for name, _ in body.feet()}
     far = {name: frame[_depth(view), 3] for name, frame in frames.items()}
     # From the side we stand at the robot's right: what has more y is further away.
     away = 1.0 if view == SIDE else -1.0
@@ -270,7 +271,7 @@ def _body(ax: Axes, body: Robot, pose: Pose, view: str, alpha: float, order: int
         for shape in link.visual:
             _shape(ax, frames[name] @ shape.T_link, shape, plane, _link_colour(side, behind), alpha, order)
         for shape in link.collision:
-            if shape.kind == "sphere":
+            if shape.kind == "sphere" and name in feet:
                 centre = (frames[name] @ shape.T_link)[:3, 3] @ plane.T
                 colour = style.FEET[side or 0]
                 ax.add_patch(

@@ -1,5 +1,8 @@
+#include <algorithm>
+#include <array>
 #include <catch2/catch_test_macros.hpp>
 #include <cmath>
+#include <vector>
 
 #include "tests/sim/robots.hpp"
 
@@ -147,6 +150,137 @@ TEST_CASE("ATrunkOnTheGroundIsSeen") {
     seen = seen || world.body_on_ground() == 0;
   }
   CHECK(seen);
+}
+
+TEST_CASE("ATarsusOnTheGroundIsNoFoot") {
+  // The left leg's last link lies forward, level, its rod on the ground as its foot is; the right leg is folded up.
+  WorldSetup setup = test::biped_world(0.0);
+  setup.initial.q << 0.0, 0.3, 0.3, -0.6 - M_PI_2, 0.0, -1.2, 2.4, -1.2;
+  setup.initial.p_WB.z() = setup.feet[0].radius - foot_tips(setup.model, setup.feet, setup.initial)[0].z() - 1e-4;
+  World world(setup);
+  const int tarsus = setup.feet[0].body;
+  bool seen = false;
+  for (int i = 0; i < 50; ++i) {
+    world.step(hold(setup, world.state()), {});
+    CHECK((world.body_on_ground() == -1 || world.body_on_ground() == tarsus));
+    seen = seen || world.body_on_ground() == tarsus;
+  }
+  CHECK(seen);
+}
+
+namespace {
+
+/// What collides of a robot's bodies in W: the middle lines of rods, and their radius. Balls are rods of no length.
+struct Rod {
+  int body = 0;
+  Vector3 from = Vector3::Zero(), to = Vector3::Zero();
+  double radius = 0.0;
+};
+
+std::vector<Rod> rods(const WorldSetup& setup, const rigid_body::State& state) {
+  rigid_body::Kinematics kinematics;
+  rigid_body::forward_kinematics(setup.model, state, kinematics);
+  std::vector<Rod> found;
+  for (const auto& shape : setup.shapes) {
+    if (shape.kind == rigid_body::ShapeKind::kBox) continue;
+    const auto body = static_cast<std::size_t>(shape.body);
+    const double half = shape.kind == rigid_body::ShapeKind::kCylinder ? 0.5 * shape.size.y() : 0.0;
+    const Vector3 centre = kinematics.p_W[body] + kinematics.R_W[body] * shape.p_LS;
+    const Vector3 axis = kinematics.R_W[body] * shape.R_LS.col(2);
+    found.push_back({shape.body, centre - half * axis, centre + half * axis, shape.size.x()});
+  }
+  return found;
+}
+
+/// m, between the surfaces of two rods with rounded ends: negative where they meet.
+double gap(const Rod& a, const Rod& b) {
+  // The distance of the middle lines is convex along each: go to and fro between nearest points.
+  const auto nearest = [](const Rod& rod, const Vector3& p) -> Vector3 {
+    const Vector3 along = rod.to - rod.from;
+    const double length = along.squaredNorm();
+    return rod.from + (length > 0.0 ? std::clamp(along.dot(p - rod.from) / length, 0.0, 1.0) : 0.0) * along;
+  };
+  Vector3 p = 0.5 * (a.from + a.to), q = nearest(b, p);
+  for (int i = 0; i < 60; ++i) {
+    p = nearest(a, q);
+    q = nearest(b, p);
+  }
+  return (p - q).norm() - a.radius - b.radius;
+}
+
+/// m, the least gap between the bodies of one leg and those of the other.
+double gap_between_legs(const WorldSetup& setup, const rigid_body::State& state) {
+  double least = 1.0;
+  const auto all = rods(setup, state);
+  for (const Rod& a : all) {
+    for (const Rod& b : all) {
+      if (a.body >= 1 && a.body <= 4 && b.body >= 5) least = std::min(least, gap(a, b));
+    }
+  }
+  return least;
+}
+
+}  // namespace
+
+TEST_CASE("LegsThatArePressedTogetherMeetAndKeepTheRobotsMomentum") {
+  // In flight, the legs nearly straight and their hips rolled inward.
+  WorldSetup setup = test::biped_world(20.0);
+  setup.initial.q << 0.0, 0.0, 0.1, 0.0, 0.0, -0.1, 0.2, -0.1;
+  const JointVector damping = test::biped().drives.damping;  // stable in every posture
+  World world(setup);
+  const Mechanics start = world.mechanics();
+  double least = gap_between_legs(setup, world.state());
+  REQUIRE(least > 0.1);
+  for (int i = 0; i < kHalfSecond; ++i) {
+    JointVector torque = 30.0 * (setup.initial.q - world.state().q) - damping.cwiseProduct(world.state().qd);
+    torque[0] = -3.0 - damping[0] * world.state().qd[0];
+    torque[4] = 3.0 - damping[4] * world.state().qd[4];
+    world.step(torque, {});
+    least = std::min(least, gap_between_legs(setup, world.state()));
+  }
+  const Mechanics end = world.mechanics();
+  const Vector3 fallen(0.0, 0.0, -kGravity * kHalfSecond * kPhysicsStep);
+  CHECK(least < 1e-4);
+  CHECK(least > -5e-3);
+  CHECK(gap_between_legs(setup, world.state()) < 1e-3);  // they still press
+  const double moved = setup.model.total_mass * fallen.norm();
+  CHECK(setup.model.total_mass * (end.v_WC - start.v_WC - fallen).norm() < kMomentumTolerance * moved);
+  CHECK(end.L_C_W.norm() < 1e-3);
+}
+
+TEST_CASE("ALegsOwnLinksDoNotMeetOverTheRangesOfWalking") {
+  const WorldSetup setup = test::biped_world(0.0);
+  // What hard pushes at 1.6 m/s asked of each joint, and a tenth of a radian more.
+  const std::array<std::array<double, 2>, 4> range = {{{-0.6, 0.6}, {-1.65, 0.95}, {0.05, 2.0}, {-1.75, 0.15}}};
+  constexpr int steps = 6;
+  double least = 1.0;
+  rigid_body::State state;
+  for (int a = 0; a <= steps; ++a) {
+    for (int b = 0; b <= steps; ++b) {
+      for (int c = 0; c <= steps; ++c) {
+        const auto at = [&](std::size_t joint, int step) {
+          return range[joint][0] + (range[joint][1] - range[joint][0]) * step / steps;
+        };
+        state.q << 0.0, at(1, a), at(2, b), at(3, c), 0.0, at(1, a), at(2, b), at(3, c);
+        for (const Rod& one : rods(setup, state)) {
+          for (const Rod& other : rods(setup, state)) {
+            if (one.body >= 1 && other.body == one.body + 2 && other.body <= 4)
+              least = std::min(least, gap(one, other));
+          }
+        }
+      }
+    }
+  }
+  CHECK(least > 0.02);
+}
+
+TEST_CASE("AtTheNominalPostureNothingMeets") {
+  const WorldSetup setup = test::biped_world(20.0);
+  CHECK(gap_between_legs(setup, setup.initial) > 0.1);
+  // Without a contact, a step in free flight from rest turns no joint.
+  World world(setup);
+  for (int i = 0; i < 20; ++i) world.step(JointVector::Zero(), {});
+  CHECK(world.state().qd.norm() < 1e-9);
 }
 
 TEST_CASE("TheStateMatchesTheModelsOwnKinematics") {
