@@ -16,6 +16,7 @@ using kinematics::Fall;
 constexpr double kSettling = 3.0;  // s of a segment that its means leave out, at most
 
 bool same_wish(const sim::ScheduledCommand& a, const sim::ScheduledCommand& b) {
+  if (a.silent || b.silent) return a.silent == b.silent;
   return a.behaviour == b.behaviour && a.velocity == b.velocity && a.yaw_rate == b.yaw_rate &&
          a.height_offset == b.height_offset;
 }
@@ -75,7 +76,7 @@ const char* name_of(Fall fall) {
 std::string as_json(const Segment& s) {
   std::ostringstream out;
   out << "{\"start_s\": " << number(s.start) << ", \"end_s\": " << number(s.end)
-      << ", \"behaviour\": " << quoted(sim::behaviour_name(s.wanted.behaviour))
+      << ", \"behaviour\": " << quoted(std::string(sim::behaviour_name(s.wanted)))
       << ", \"velocity_m_s\": " << list(s.wanted.velocity) << ", \"yaw_rate_rad_s\": " << number(s.wanted.yaw_rate)
       << ", \"height_offset_m\": " << number(s.wanted.height_offset)
       << ", \"measured_from_s\": " << number(s.measured_from) << ", \"mean_velocity_m_s\": " << list(s.mean_velocity)
@@ -171,7 +172,7 @@ std::string as_text(const Summary& s) {
       << std::dec << "\n";
   out << std::fixed << std::setprecision(2);
   for (const Segment& segment : s.segments) {
-    if (segment.wanted.behaviour != Behaviour::kWalk) continue;
+    if (segment.wanted.silent || segment.wanted.behaviour != Behaviour::kWalk) continue;
     out << "  " << segment.start << " to " << segment.end << " s: wanted (" << segment.wanted.velocity.x() << ", "
         << segment.wanted.velocity.y() << ") m/s, " << segment.wanted.yaw_rate << " rad/s; walked ("
         << segment.mean_velocity.x() << ", " << segment.mean_velocity.y() << ") m/s, " << segment.mean_yaw_rate

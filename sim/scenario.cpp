@@ -17,6 +17,7 @@ using config::StrictYaml;
 using platform::to_text;
 
 constexpr std::array<std::string_view, 5> kBehaviourNames = {"stand", "walk", "lie-down", "track", "catch"};
+constexpr std::string_view kSilent = "silent";  // of who commands, not of the robot
 static_assert(static_cast<int>(Behaviour::kCatch) + 1 == kBehaviourNames.size());
 
 double number_in(StrictYaml& yaml, const std::string& key, double lowest, double highest) {
@@ -127,9 +128,14 @@ ScheduledCommand command_from(StrictYaml yaml) {
   ScheduledCommand command;
   command.period = whole_steps(yaml, "time", kControlPeriod, 100'000'000);
   const std::string name = yaml.text("behaviour");
+  if (name == kSilent) {
+    command.silent = true;
+    yaml.finish();
+    return command;
+  }
   const auto* known = std::find(kBehaviourNames.begin(), kBehaviourNames.end(), name);
   if (known == kBehaviourNames.end()) {
-    yaml.fail("behaviour", "is '" + name + "', but must be stand, walk, lie-down, track or catch");
+    yaml.fail("behaviour", "is '" + name + "', but must be stand, walk, lie-down, track, catch or silent");
   }
   command.behaviour = static_cast<Behaviour>(known - kBehaviourNames.begin());
   const std::vector<double> velocity = yaml.numbers("velocity", 2);
@@ -142,7 +148,9 @@ ScheduledCommand command_from(StrictYaml yaml) {
 
 }  // namespace
 
-const char* behaviour_name(Behaviour behaviour) { return kBehaviourNames[static_cast<std::size_t>(behaviour)].data(); }
+std::string_view behaviour_name(const ScheduledCommand& command) {
+  return command.silent ? kSilent : kBehaviourNames[static_cast<std::size_t>(command.behaviour)];
+}
 
 std::optional<Plant> plant_from_name(const std::string& name) {
   if (name == "multibody") return Plant::kMultibody;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "controller/config/strict_yaml.hpp"
@@ -18,9 +19,6 @@ enum class Plant { kMultibody, kSingleBody };
 
 /// "multibody" or "single-body"; nothing for another word.
 std::optional<Plant> plant_from_name(const std::string& name);
-
-/// As scenarios write it.
-const char* behaviour_name(Behaviour behaviour);
 
 /// Errors of the sensors. White ones are standard deviations of each 1 kHz sample; biases and offsets have the given
 /// size and a random sign on each axis or joint.
@@ -58,12 +56,16 @@ struct ScheduledPush {
 };
 
 struct ScheduledCommand {
-  int period = 0;  ///< control period at whose start it is given
+  int period = 0;  ///< control period from whose start it is given, every kUserCommandPeriods
   Behaviour behaviour = Behaviour::kStand;
   Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  ///< m/s, in H
   double yaw_rate = 0.0;                               ///< rad/s
   double height_offset = 0.0;                          ///< m
+  bool silent = false;                                 ///< nothing is sent from here on
 };
+
+/// As scenarios write it.
+std::string_view behaviour_name(const ScheduledCommand& command);
 
 struct Scenario {
   std::string text;               ///< the whole file, as draw_random_values leaves it
@@ -82,6 +84,7 @@ struct Scenario {
   std::vector<ScheduledCommand> commands;  ///< in order of time, at most one a period
 };
 
+inline constexpr int kUserCommandPeriods = 10;  ///< control periods between two user commands, as programs send them
 inline constexpr int kMaxCommandDelaySteps = 50;
 inline constexpr int kMaxSensorDelaySteps = 20;
 

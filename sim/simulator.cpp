@@ -279,19 +279,20 @@ void Simulator::write_messages(const Sums& sums) noexcept {
   truth_.refused_order = refused().order;
   truth_.refused_run = refused().run;
 
-  user_command_due_ = next_command_ < scenario_.commands.size() && scenario_.commands[next_command_].period == period_;
-  if (user_command_due_) {
-    const ScheduledCommand& command = scenario_.commands[next_command_];
-    ++next_command_;
-    user_command_.utime = utime;
-    user_command_.seq = static_cast<std::int64_t>(next_command_);
-    user_command_.run_id = options_.run_id;
-    user_command_.behaviour = static_cast<std::int8_t>(command.behaviour);
-    user_command_.velocity[0] = command.velocity.x();
-    user_command_.velocity[1] = command.velocity.y();
-    user_command_.yaw_rate = command.yaw_rate;
-    user_command_.height_offset = command.height_offset;
-  }
+  const auto& commands = scenario_.commands;
+  while (next_command_ < commands.size() && commands[next_command_].period <= period_) ++next_command_;
+  if (next_command_ == 0) return;
+  const ScheduledCommand& command = commands[next_command_ - 1];
+  user_command_due_ = !command.silent && (period_ - command.period) % kUserCommandPeriods == 0;
+  if (!user_command_due_) return;
+  user_command_.utime = utime;
+  ++user_command_.seq;
+  user_command_.run_id = options_.run_id;
+  user_command_.behaviour = static_cast<std::int8_t>(command.behaviour);
+  user_command_.velocity[0] = command.velocity.x();
+  user_command_.velocity[1] = command.velocity.y();
+  user_command_.yaw_rate = command.yaw_rate;
+  user_command_.height_offset = command.height_offset;
 }
 
 }  // namespace stance::sim

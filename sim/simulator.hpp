@@ -39,7 +39,7 @@ class Simulator {
 
   const stance_msgs::robot_state_t& state() const { return state_; }
   const stance_msgs::truth_t& truth() const { return truth_; }
-  /// The scenario's command that is due at this instant; null where there is none.
+  /// The scenario's command in force, sent again and again as an operator's program would: at this instant, else null.
   const stance_msgs::user_command_t* user_command() const { return user_command_due_ ? &user_command_ : nullptr; }
 
   Acceptance accept(const stance_msgs::joint_command_t& command) noexcept;

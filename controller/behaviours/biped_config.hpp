@@ -65,7 +65,8 @@ struct TorqueMapConfig {
 };
 
 struct BipedConfig {
-  double last_link_pitch = 0.0;  ///< rad, of a leg's last link against the vertical
+  double last_link_pitch = 0.0;       ///< rad, of a leg's last link against the vertical
+  double user_command_timeout = 0.0;  ///< s without a user command after which it stops and stands
   estimation::BaseEstimatorConfig estimator;
   estimation::CentreOfMassOffsetConfig com_offset_observer;
   double com_offset_quiet_momentum = 0.0;  ///< kg m^2/s, about C, above which the observer waits

@@ -124,19 +124,7 @@ bool BipedController::accept(const TickInput& input) noexcept {
   if (starts_run(memory_.run_id, memory_.state_seq, state)) start_run(state.run_id);
   if (input.operator_stop) ladder_.report(Fault::kOperatorStop);
 
-  const UserCommand& command = input.user_command;
-  if (command.seq != memory_.user_command.seq) {
-    const bool offered = (command.behaviour == Behaviour::kStand || command.behaviour == Behaviour::kWalk) &&
-                         command.height_offset >= config_.stand.height_offset_range[0] &&
-                         command.height_offset <= config_.stand.height_offset_range[1];
-    if (safety::command_is_plausible(command) && offered) {
-      memory_.user_command = command;
-    } else {
-      memory_.user_command.seq = command.seq;
-      ladder_.report(Fault::kCommandInvalid);
-    }
-  }
-
+  take_command(input);
   if (!input.state_is_new) {
     ladder_.report(Fault::kStateStale);
     return false;
@@ -148,6 +136,30 @@ bool BipedController::accept(const TickInput& input) noexcept {
   memory_.state_seq = state.seq;
   memory_.state_utime = state.utime;
   return true;
+}
+
+void BipedController::take_command(const TickInput& input) noexcept {
+  const UserCommand& command = input.user_command;
+  UserCommand& taken = memory_.user_command;
+  memory_.user_command_age += input.periods;
+  if (command.seq != taken.seq) {
+    const bool offered = (command.behaviour == Behaviour::kStand || command.behaviour == Behaviour::kWalk) &&
+                         command.height_offset >= config_.stand.height_offset_range[0] &&
+                         command.height_offset <= config_.stand.height_offset_range[1];
+    if (safety::command_is_plausible(command) && offered) {
+      taken = command;
+      memory_.user_command_age = 0;
+    } else {
+      taken.seq = command.seq;
+      ladder_.report(Fault::kCommandInvalid);
+    }
+  }
+  // An operator who is heard no more wants nothing: not what was wanted last.
+  if (kControlPeriod * static_cast<double>(memory_.user_command_age) > config_.user_command_timeout) {
+    taken.behaviour = Behaviour::kStand;
+    taken.velocity.setZero();
+    taken.yaw_rate = 0.0;
+  }
 }
 
 bool BipedController::follows(const RobotState& state) const noexcept {

@@ -30,17 +30,19 @@ class BipedController {
   /// What a run has made of the controller so far: a new run starts with a new one.
   struct Memory {
     std::int64_t run_id = 0;
-    std::int64_t state_seq = 0;     ///< last state acted on
-    std::int64_t state_utime = -1;  ///< us
-    UserCommand user_command;       ///< last plausible one
-    double yaw = 0.0;               ///< rad, unwrapped
-    bool standing = false;          ///< the stance has been taken up
+    std::int64_t state_seq = 0;         ///< last state acted on
+    std::int64_t state_utime = -1;      ///< us
+    UserCommand user_command;           ///< last plausible one, or what is left of it when it is old
+    std::int64_t user_command_age = 0;  ///< control periods since it came, by the ticks
+    double yaw = 0.0;                   ///< rad, unwrapped
+    bool standing = false;              ///< the stance has been taken up
     bool stepping = false;
     TickOutput last;  ///< what HOLD repeats
   };
 
   void start_run(std::int64_t run_id) noexcept;
   bool accept(const TickInput& input) noexcept;
+  void take_command(const TickInput& input) noexcept;
   void estimate(int periods, const RobotState& state, BaseEstimate& base) noexcept;
   void plan(int periods, const RobotState& state, Trace& trace) noexcept;
   void stand(const WalkInput& now, TickState& reference) noexcept;

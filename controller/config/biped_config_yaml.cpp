@@ -223,6 +223,7 @@ behaviours::BipedConfig biped_config(const RobotDescription& robot) {
   StrictYaml yaml = root.mapping("controller");
   behaviours::BipedConfig c;
   c.last_link_pitch = yaml.number("last_link_pitch");
+  c.user_command_timeout = yaml.number("user_command_timeout");
   c.estimator = estimator(yaml.mapping("estimator"));
   c.com_offset_observer = com_offset_observer(yaml.mapping("com_offset_observer"), c.com_offset_quiet_momentum);
   force_qp(yaml.mapping("force_qp"), c.force_qp, c.force_limits);

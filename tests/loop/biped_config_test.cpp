@@ -68,6 +68,7 @@ TEST_CASE("TheBipedsOwnConfigurationIsRead") {
   const behaviours::BipedConfig c = biped_config(biped());
   const YAML::Node yaml = YAML::Load(biped().yaml_text)["controller"];
   CHECK(c.last_link_pitch == yaml["last_link_pitch"].as<double>());
+  CHECK(c.user_command_timeout == yaml["user_command_timeout"].as<double>());
   CHECK(c.estimator.initial_accelerometer_bias_sigma ==
         yaml["estimator"]["initial_accelerometer_bias_sigma"].as<double>());
   CHECK(c.com_offset_observer.bandwidth == yaml["com_offset_observer"]["bandwidth"].as<double>());
@@ -139,6 +140,7 @@ TEST_CASE("AValueOutOfRangeIsRefusedByItsName") {
   const std::array cases{
       Case{"last_link_pitch", "1.6", "last_link_pitch"},
       Case{"last_link_pitch", "-1.6", "last_link_pitch"},
+      Case{"user_command_timeout", "0", "user_command_timeout"},
       Case{"estimator.gyro_noise", "-1e-6", "gyro_noise"},
       Case{"estimator.accelerometer_noise", "0", "accelerometer_noise"},
       Case{"estimator.swing_foot_noise", "0", "swing_foot_noise"},

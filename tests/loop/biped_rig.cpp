@@ -68,18 +68,32 @@ void BipedRig::answer() {
 }
 
 void BipedRig::tick_with(const stance_msgs::robot_state_t& state) {
+  repeat_command();
   static_cast<void>(ticker.offer_state(bytes_of(state)));
   answer();
 }
 
-void BipedRig::tick_without_state() { answer(); }
+void BipedRig::tick_without_state() {
+  repeat_command();
+  answer();
+}
 
 void BipedRig::tick_times(int periods) {
   for (int k = 0; k < periods; ++k) tick();
 }
 
 void BipedRig::give(const stance_msgs::user_command_t& command) {
+  given_ = command;
+  ticks_since_given_ = 0;
   static_cast<void>(ticker.offer_user_command(bytes_of(command)));
+}
+
+void BipedRig::repeat_command() {
+  if (given_ && ticks_since_given_ == sim::kUserCommandPeriods) {
+    ++given_->seq;
+    give(*given_);
+  }
+  ++ticks_since_given_;
 }
 
 void BipedRig::press_stop(std::int64_t seq) {

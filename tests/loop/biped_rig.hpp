@@ -2,6 +2,7 @@
 // The biped's simulator and controller in one process, one control period at a time, with hands on what the controller
 // is told.
 #include <cstdint>
+#include <optional>
 #include <stance_msgs/joint_command_t.hpp>
 #include <stance_msgs/robot_state_t.hpp>
 #include <stance_msgs/user_command_t.hpp>
@@ -53,7 +54,9 @@ class BipedRig {
   void tick_without_state();
   void tick_times(int periods);
 
+  /// From now on every 0.1 s, with growing numbers, as an operator's program does.
   void give(const stance_msgs::user_command_t& command);
+  void fall_silent() { given_.reset(); }
   void press_stop(std::int64_t seq);
 
   const Trace& trace() const { return ticker.output().trace; }
@@ -67,6 +70,10 @@ class BipedRig {
 
  private:
   void answer();
+  void repeat_command();
+
+  std::optional<stance_msgs::user_command_t> given_;
+  int ticks_since_given_ = 0;
 };
 
 /// The states of a run with the biped's own controller, encoded; `scenario`'s user commands are left out.

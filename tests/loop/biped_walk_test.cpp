@@ -4,6 +4,7 @@
 #include <catch2/catch_test_macros.hpp>
 #include <cmath>
 
+#include "controller/config/biped_config_yaml.hpp"
 #include "tests/loop/biped_rig.hpp"
 
 namespace stance::behaviours {
@@ -131,6 +132,45 @@ TEST_CASE("ThePlanSaysWhichFeetBearAndTheSwingFootBearsNothing") {
     }
   }
   CHECK(single > kSecond);
+}
+
+TEST_CASE("WhereUserCommandsCeaseItStopsAndStands") {
+  const double timeout = config::biped_config(test::biped()).user_command_timeout;
+  const int ticks = static_cast<int>(std::lround(timeout / kControlPeriod));
+  BipedRig rig;
+  rig.tick_times(kSettled);
+  rig.give(walk_command(1, 0.4, 0.0, 0.2));
+  rig.tick_times(4 * kSecond + 1);  // the last command came a tick ago
+  const Vector3 wanted = rig.trace().gait.velocity_wanted;
+  CHECK(wanted.x() == 0.4);
+  rig.fall_silent();
+  rig.tick_times(ticks);
+  CHECK(rig.trace().gait.velocity_wanted == wanted);
+  rig.tick();
+  CHECK(rig.trace().gait.velocity_wanted.x() < wanted.x());
+  CHECK(rig.trace().gait.velocity_wanted.z() < wanted.z());
+  rig.tick_times(6 * kSecond);
+  CHECK(rig.trace().behaviour == Behaviour::kStand);
+  CHECK(rig.trace().safety == SafetyMode::kRun);
+  CHECK_FALSE(rig.simulator.fallen());
+  CHECK(std::abs(rig.simulator.truth().v_WC[0]) < 0.02);
+  // Heard again, it walks again.
+  rig.give(walk_command(1000, 0.4, 0.0, 0.0));
+  rig.tick_times(2 * kSecond);
+  CHECK(rig.trace().behaviour == Behaviour::kWalk);
+  CHECK(rig.trace().gait.velocity_wanted.x() == 0.4);
+}
+
+TEST_CASE("AUserCommandAgesByTicksThatWereMissedToo") {
+  BipedRig rig;
+  rig.tick_times(kSettled);
+  rig.give(walk_command(1, 0.4, 0.0, 0.0));
+  rig.tick_times(2 * kSecond + 1);
+  REQUIRE(rig.trace().gait.velocity_wanted.x() == 0.4);
+  loop::NoClock clock;
+  REQUIRE(rig.ticker.offer_state(test::bytes_of(rig.state())));
+  rig.ticker.tick(51, clock);
+  CHECK(rig.trace().gait.velocity_wanted.x() < 0.4);
 }
 
 }  // namespace stance::behaviours

@@ -86,6 +86,11 @@ TEST_CASE("ASegmentEndsWhereAnotherWishBegins") {
   CHECK(found[1].wanted.height_offset == -0.05);
   CHECK(found[2].end == 10.0);
   CHECK(segments({}, path).empty());
+  const auto silence = [](int period) { return ScheduledCommand{.period = period, .silent = true}; };
+  const auto ceased = segments({walk(0, 0.3), silence(300), silence(400), walk(700, 0.3)}, path);
+  REQUIRE(ceased.size() == 3);
+  CHECK(ceased[1].wanted.silent);
+  CHECK(ceased[1].end == 7.0);
 }
 
 TEST_CASE("TicksAreCountedOnAGridWithTheirExactPercentiles") {

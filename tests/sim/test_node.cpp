@@ -88,7 +88,7 @@ TEST_CASE("LockstepAdvancesWithEachAnswer") {
   CHECK(bench.simulator.state().seq == 51);
   CHECK(bench.states.size() == 50);
   CHECK(bench.others["TRUTH"].size() == 51);
-  CHECK(bench.others["USER_COMMAND"].size() == 1);
+  CHECK(bench.others["USER_COMMAND"].size() == 5);  // every 10 periods
   CHECK(bench.simulator.refused().total() == 0);
 }
 

@@ -89,6 +89,18 @@ TEST_CASE("APushMayBeGivenByItsImpulseAndDirection") {
   CHECK(names(error_of(force, "impulse: -6.0, direction: 1.0"), "pushes[1].impulse is -6"));
 }
 
+TEST_CASE("CommandsMayCease") {
+  std::string text = text_of("demo");
+  const auto scenario = scenario_from_text(text + "  - {time: 5.0, behaviour: silent}\n", "demo.yaml", 1);
+  REQUIRE(scenario.commands.size() == 2);
+  CHECK_FALSE(scenario.commands[0].silent);
+  CHECK(scenario.commands[1].silent);
+  CHECK(scenario.commands[1].period == 500);
+  CHECK(behaviour_name(scenario.commands[0]) == "stand");
+  CHECK(behaviour_name(scenario.commands[1]) == "silent");
+  CHECK(names(error_of("behaviour: stand", "behaviour: silent"), "commands[1].velocity is not a known key"));
+}
+
 TEST_CASE("TerrainIsFlatOrASlopeWithOrWithoutTiles") {
   const auto terrain = [](const std::string& value) {
     std::string text = text_of("demo");

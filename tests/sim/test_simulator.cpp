@@ -273,25 +273,30 @@ TEST_CASE("TruthSaysHowFarTheContactForcesAreFromThePlan") {
   CHECK(run.simulator.truth().plan_seq == 0);  // too old to be compared
 }
 
-TEST_CASE("UserCommandsAreGivenWhenTheyAreDue") {
+TEST_CASE("UserCommandsAreGivenWhenTheyAreDueAndAgainEvery100msUntilSilence") {
   Scenario scenario = test::biped_scenario("stand");
-  scenario.commands = {{0, Behaviour::kStand, {0.0, 0.0}, 0.0, 0.0}, {3, Behaviour::kWalk, {0.4, -0.1}, 0.2, -0.05}};
+  scenario.commands = {{2, Behaviour::kStand, {0.0, 0.0}, 0.0, 0.0},
+                       {15, Behaviour::kWalk, {0.4, -0.1}, 0.2, -0.05},
+                       {38, Behaviour::kStand, {0.0, 0.0}, 0.0, 0.0, /*silent=*/true},
+                       {70, Behaviour::kStand, {0.0, 0.0}, 0.0, 0.0}};
+  const std::vector<int> expected = {2, 12, 15, 25, 35, 70, 80};
   Run run(scenario);
-  REQUIRE(run.simulator.user_command() != nullptr);
-  CHECK(run.simulator.user_command()->seq == 1);
-  for (int k = 1; k <= 5; ++k) {
+  std::vector<int> given;
+  for (int k = 0; k < 85; ++k) {
+    if (const auto* command = run.simulator.user_command()) {
+      given.push_back(k);
+      const bool walks = k >= 15 && k < 38;
+      CHECK(command->seq == static_cast<std::int64_t>(given.size()));
+      CHECK(command->utime == 10'000 * k);
+      CHECK(command->behaviour == (walks ? stance_msgs::user_command_t::WALK : stance_msgs::user_command_t::STAND));
+      CHECK(command->velocity[0] == (walks ? 0.4 : 0.0));
+      CHECK(command->velocity[1] == (walks ? -0.1 : 0.0));
+      CHECK(command->yaw_rate == (walks ? 0.2 : 0.0));
+      CHECK(command->height_offset == (walks ? -0.05 : 0.0));
+    }
     run.simulator.advance();
-    const auto* command = run.simulator.user_command();
-    CHECK((command != nullptr) == (k == 3));
-    if (command == nullptr) continue;
-    CHECK(command->seq == 2);
-    CHECK(command->utime == 30'000);
-    CHECK(command->behaviour == stance_msgs::user_command_t::WALK);
-    CHECK(command->velocity[0] == 0.4);
-    CHECK(command->velocity[1] == -0.1);
-    CHECK(command->yaw_rate == 0.2);
-    CHECK(command->height_offset == -0.05);
   }
+  CHECK(given == expected);
 }
 
 TEST_CASE("ALimpRobotFallsAndTruthSaysSoForGood") {
