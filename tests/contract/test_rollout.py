@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -76,3 +78,19 @@ def test_the_log_holds_the_scenario_as_it_was_drawn(walked: tuple[dict[str, Any]
     assert run.field("USER_COMMAND", "velocity")[0, 0] == told["segments"][0]["velocity_m_s"][0] == speed
     assert scenario["friction"] == told["drawn"]["friction"] in (0.6, 0.9)
     assert "# Drawn by the seed 4 from:" in run.simulator.scenario
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_the_readmes_random_scenario_runs(tmp_path: Path, seed: int) -> None:
+    """Seed 1 draws a slope, 2 flat ground: both of the README's choices."""
+    (example,) = re.findall(r"```\n(friction: .*?)```", (SOURCE_TREE / "README.md").read_text(), re.DOTALL)
+    scenario = yaml.safe_load((SOURCE_TREE / "sim/scenarios/biped/stand.yaml").read_text()) | yaml.safe_load(example)
+    file = tmp_path / "wild.yaml"
+    file.write_text(yaml.safe_dump(scenario))
+    words = ["--robot", "biped", "--scenario", str(file), "--seed", str(seed), "--duration", "1", "--json"]
+    done = subprocess.run([str(find_program("stance-rollout")), *words], check=True, capture_output=True, text=True)
+    drawn = json.loads(done.stdout)["drawn"]
+    assert 0.5 <= drawn["friction"] <= 0.8
+    assert round(1000 * drawn["command_latency"], 9) in range(6)
+    assert 5.0 <= drawn["pushes[1].time"] <= 7.0
+    assert drawn["terrain"] == ("choice[2]" if seed == 1 else "flat")
