@@ -69,7 +69,7 @@ def summary_card(run: Run, measured: Metrics, verdict: Verdict | None = None) ->
         ax.text(left, y, finding.limit.name, fontsize=8.5, va="center", color=ink)
         ax.text(bar - 0.15, y, finding.measured, fontsize=8.5, va="center", ha="right", color=ink)
         _limit_bar(ax, finding.limit.bound, finding.limit.value, finding.value, (bar, right - 1.05), y, finding.passed)
-        ax.text(right, y, finding.rule, fontsize=8, va="center", ha="right", color=style.MUTED)
+        ax.text(right, y, finding.limit.rule, fontsize=8, va="center", ha="right", color=style.MUTED)
     return fig
 
 

@@ -12,7 +12,13 @@ from stance.metrics import measure
 from stance.series import Run
 from synthetic import Synthetic, run_of
 
-FIGURES = {"fell": False, "trunk": {"tilt_max_deg": 3.0}, "qp": None, "count": 2}
+FIGURES = {
+    "fell": False,
+    "trunk": {"tilt_max_deg": 3.0},
+    "qp": None,
+    "count": 2,
+    "segments": [{}, {"wanted": [-0.5, 0.0], "measured": [-0.48, 0.01]}],
+}
 
 
 def test_a_limit_is_kept_up_to_its_value() -> None:
@@ -21,6 +27,18 @@ def test_a_limit_is_kept_up_to_its_value() -> None:
     assert not judge(FIGURES, [Limit("tilt", "trunk.tilt_max_deg", "max", 2.9)]).passed
     assert not judge(FIGURES, [Limit("count", "count", "min", 3)]).passed
     assert judge(FIGURES, [Limit("fell", "fell", "equals", False)]).passed
+
+
+@pytest.mark.parametrize("of", [-0.5, "segments.1.wanted.0"])
+def test_a_figure_is_within_a_share_of_a_number_or_of_another_figure(of: float | str) -> None:
+    kept = Limit("speed", "segments.1.measured.0", "within", 0.05, "m/s", of=of)
+    assert judge(FIGURES, [kept]).passed
+    assert not judge(FIGURES, [Limit("speed", "segments.1.measured.0", "within", 0.03, of=of)]).passed
+    assert not judge(
+        FIGURES, [Limit("aside", "segments.1.measured.1", "within", 0.05, of="segments.1.wanted.1")]
+    ).passed
+    assert not judge(FIGURES, [Limit("tilt", "trunk.tilt_max_deg", "within", 0.05, of="qp.failures")]).passed
+    assert kept.rule == f"within 5 % of {'-0.5 m/s' if of == -0.5 else of}"
 
 
 def test_what_the_machine_does_not_keep_up_with_is_told_and_fails_nothing() -> None:
@@ -42,8 +60,11 @@ def test_what_the_log_lacks_fails_unless_it_is_optional() -> None:
 
 
 def test_a_limit_on_an_unknown_figure_is_an_error() -> None:
-    with pytest.raises(StanceError, match=r"trunk\.tilt_max"):
-        judge(FIGURES, [Limit("tilt", "trunk.tilt_max", "max", 3.0)])
+    for metric in ("trunk.tilt_max", "segments.2.wanted", "segments.-1.wanted", "fell.0", "segments.first"):
+        with pytest.raises(StanceError, match=f"limit 'tilt': no figure '{metric}'"):
+            judge(FIGURES, [Limit("tilt", metric, "max", 3.0)])
+    with pytest.raises(StanceError, match=r"limit 'tilt': segments\.1\.wanted is no number"):
+        judge(FIGURES, [Limit("tilt", "segments.1.wanted", "max", 3.0)])
 
 
 @pytest.mark.parametrize(
@@ -51,7 +72,10 @@ def test_a_limit_on_an_unknown_figure_is_an_error() -> None:
     [
         ("{name: a, metric: fell, max: 1, maximum: 2}", "unknown key maximum"),
         ("{name: a, max: 1}", "metric is missing"),
-        ("{name: a, metric: fell}", "give one of max, min, equals"),
+        ("{name: a, metric: fell}", "give one of max, min, equals, within"),
+        ("{name: a, metric: fell, within: 0.1}", "within and of go together"),
+        ("{name: a, metric: fell, max: 1, of: 2}", "within and of go together"),
+        ("{name: a, metric: fell, within: 0.1, of: [1]}", "of is [1], but must be a number"),
         ("{name: a, metric: fell, max: 1, min: 0}", "give one of"),
         ("{name: a, metric: fell, max: high}", "'high', but must be a number"),
         ("just text", "no mapping"),
@@ -63,7 +87,7 @@ def test_a_wrong_entry_is_named(entry: str, message: str) -> None:
     assert message in str(caught.value)
 
 
-@pytest.mark.parametrize("text", ["", "limits: 3", "limits: []\nmore: 1", "limits: [", "- a"])
+@pytest.mark.parametrize("text", ["", "limits: 3", "limits: []\nmore: 1", "limits: [", "- a", "limits: []\nlimits: []"])
 def test_what_is_no_list_of_limits_is_an_error(text: str) -> None:
     with pytest.raises(StanceError, match="file"):
         parse_limits(text, "file")
@@ -93,6 +117,8 @@ def test_standing_keeps_the_limits_and_falling_or_standing_without_states_does_n
     ("value", "unit", "text"),
     [
         (26.49, "deg", "26.5°"),
+        (0.5, "rad", "28.6°"),
+        (-0.00612, "rad", "-6.12 mrad"),
         (0.00867, "m", "8.67 mm"),
         (0.812, "m", "0.812 m"),
         (0.005, "share", "0.5 %"),
