@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 MIN_NORMAL_FORCE = 5.0  # N, below it a contact's friction ratio says nothing
 PUSH_THRESHOLD = 1e-9  # N, of a push that counts as one
+MIN_PATH = 1.0  # m, below it drift is no share of the path
+PATH_STEP = 1.0  # s between the points that measure a path, so that sway is none of it
 SLIP_WINDOW = 0.5  # s at the run's end: the least late of its states shows what real time has lost
 
 STAGES = ("decode", "validate", "estimate", "plan", "model", "force_qp", "torque", "safety", "encode")
@@ -190,6 +192,19 @@ class EstimatorError:
     """m/s"""
     tilt_max_deg: float
     yaw_max_deg: float
+    roll_rms: float
+    """rad"""
+    pitch_rms: float
+    """rad"""
+    heading_velocity_rms: float
+    """m/s, of the worst axis: estimate and truth each in their own heading frame, since yaw is not observed"""
+    height_rms: float | None
+    """m, of B over the feet that bear load"""
+    odometry_share: float | None
+    """drift of the horizontal position over the length of the path; None for a path shorter than 1 m"""
+    nees: float | None
+    """normalised error squared per degree of freedom, of roll, pitch and the heading frame's velocity: 1 where the
+    stated sigma are right; None where one is 0"""
 
 
 @dataclass(frozen=True)
@@ -245,6 +260,8 @@ class Metrics:
     fell: bool
     fell_at: float | None
     """s"""
+    behaviour_final: str | None
+    """what the robot does at the end, one of BEHAVIOURS"""
     trunk: Trunk | None
     center_of_mass: CenterOfMass | None
     ticks: Ticks | None
@@ -281,6 +298,7 @@ def measure(run: Run, report: LogReport | None = None) -> Metrics:
         duration=run.duration,
         fell=fell_at is not None,
         fell_at=fell_at,
+        behaviour_final=behaviour_final(run),
         trunk=trunk(run),
         center_of_mass=center_of_mass(run),
         ticks=ticks(run),
@@ -342,6 +360,13 @@ def fall(run: Run) -> float | None:
     else:
         return None
     return float(time[np.argmax(down)]) if down.any() else None
+
+
+def behaviour_final(run: Run) -> str | None:
+    """What the robot does at the end."""
+    if "CONTROLLER_TRACE" not in run:
+        return None
+    return _name(BEHAVIOURS, int(run.field("CONTROLLER_TRACE", "behaviour")[-1]))
 
 
 def trunk(run: Run) -> Trunk | None:
@@ -616,15 +641,53 @@ def estimator_error(run: Run) -> EstimatorError | None:
     distance = np.linalg.norm(error, axis=1)
     v_estimate, v_truth = both("v_WB")
     q_estimate, q_truth = both("quat_WB")
-    turned = np.degrees(np.angle(np.exp(1j * (roll_pitch_yaw(q_estimate) - roll_pitch_yaw(q_truth))[:, 2])))
+    turn_estimate, turn_truth = roll_pitch_yaw(q_estimate), roll_pitch_yaw(q_truth)
+    turned = np.angle(np.exp(1j * (turn_estimate - turn_truth)))
+    v_error = _in_heading(v_estimate, turn_estimate[:, 2]) - _in_heading(v_truth, turn_truth[:, 2])
+    sigma_v, sigma_theta = (run.field("CONTROLLER_TRACE", name)[rows] for name in ("sigma_v", "sigma_theta"))
+    sigma = np.column_stack([sigma_theta[:, :2], sigma_v])
+    normalised = np.column_stack([turned[:, :2], v_error]) / np.where(sigma > 0.0, sigma, np.nan)
+    path = _path_length(truth, run.time("TRUTH")[truth_rows])
     return EstimatorError(
         position_rms=_rms(distance),
         position_max=float(distance.max()),
         position_drift=float(np.linalg.norm(error[-1] - error[0])),
         velocity_rms=_rms(np.linalg.norm(v_estimate - v_truth, axis=1)),
         tilt_max_deg=float(np.degrees(np.abs(_tilt_between(q_estimate, q_truth)).max())),
-        yaw_max_deg=float(np.abs(turned).max()),
+        yaw_max_deg=float(np.degrees(np.abs(turned[:, 2])).max()),
+        roll_rms=_rms(turned[:, 0]),
+        pitch_rms=_rms(turned[:, 1]),
+        heading_velocity_rms=max(_rms(v_error[:, axis]) for axis in range(3)),
+        height_rms=_height_rms(run, rows, truth_rows),
+        odometry_share=float(np.linalg.norm((error[-1] - error[0])[:2])) / path if path >= MIN_PATH else None,
+        nees=None if np.isnan(normalised).any() else float(np.mean(np.square(normalised))),
     )
+
+
+def _in_heading(vectors: Array, yaw: Array) -> Floats:
+    """Vectors (n, 3) of W in the frame that is turned by `yaw` [rad] (n,) about W's z."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    x, y, z = vectors.T
+    return np.column_stack([cos * x + sin * y, cos * y - sin * x, z])
+
+
+def _path_length(position: Array, time: Array) -> float:
+    """m, horizontal, of positions (n, 3) at times [s] (n,)."""
+    rows = np.searchsorted(time, np.arange(time[0], time[-1], PATH_STEP))
+    points = position[np.append(rows, len(time) - 1), :2]
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+
+def _height_rms(run: Run, rows: Integers, truth_rows: Integers) -> float | None:
+    """m, error of B's height over the feet that bear load; None where none ever does."""
+    feet = slice(num_contacts(run))
+    loaded = run.field("TRUTH", "f_F_W")[truth_rows][:, feet, 2] > MIN_NORMAL_FORCE
+
+    def height(channel: str, at: Integers) -> Floats:
+        return np.asarray(run.field(channel, "p_WB")[at][:, None, 2] - run.field(channel, "p_WF")[at][:, feet, 2])
+
+    error = height("CONTROLLER_TRACE", rows) - height("TRUTH", truth_rows)
+    return _rms(error[loaded]) if loaded.any() else None
 
 
 def pushes(run: Run) -> list[Push]:

@@ -293,6 +293,45 @@ def test_the_estimators_error_is_taken_at_the_same_instant() -> None:
     assert found.yaw_max_deg == pytest.approx(4.0)
 
 
+def test_the_estimators_errors_are_those_of_a_robot_that_does_not_know_its_yaw() -> None:
+    messages, estimate = truth(), trace()
+    half = np.radians(90.0) / 2
+    estimate["quat_WB"][:] = np.cos(half), 0.0, 0.0, np.sin(half)  # a quarter turn off, and all else right
+    messages["v_WB"][:] = 0.5, 0.1, 0.0
+    estimate["v_WB"][:] = -0.1, 0.5, 0.02
+    messages["p_WB"][:, 0] = estimate["p_WB"][:, 1] = 5.0 * np.linspace(0.0, 1.0, N)
+    messages["f_F_W"][:50, 0, 2], messages["f_F_W"][50:, 1, 2] = 130.0, 130.0
+    messages["p_WB"][:, 2], estimate["p_WB"][:, 2] = 0.82, 0.824
+    messages["p_WF"][:, :, 2], estimate["p_WF"][:, :, 2] = 0.02, 0.021
+    estimate["p_WF"][50:, 0, 2] = 9.0  # in swing
+    estimate["sigma_v"], estimate["sigma_theta"] = 0.01, 0.001
+    found = metrics.estimator_error(run_of(base(TRUTH=messages, CONTROLLER_TRACE=estimate)))
+    assert found is not None
+    assert found.yaw_max_deg == pytest.approx(90.0)
+    assert (found.roll_rms, found.pitch_rms) == pytest.approx((0.0, 0.0), abs=1e-12)
+    assert found.heading_velocity_rms == pytest.approx(0.02)
+    assert found.height_rms == pytest.approx(0.003)
+    assert found.odometry_share == pytest.approx(np.sqrt(2.0))
+    assert found.nees == pytest.approx(2.0**2 / 5.0)
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_roll_and_pitch_are_told_apart(axis: int) -> None:
+    messages, estimate = truth(), trace()
+    estimate["quat_WB"][:, 0], estimate["quat_WB"][:, 1 + axis] = np.cos(0.005), np.sin(0.005)
+    found = metrics.estimator_error(run_of(base(TRUTH=messages, CONTROLLER_TRACE=estimate)))
+    assert found is not None
+    assert (found.roll_rms, found.pitch_rms) == pytest.approx((0.01, 0.0) if axis == 0 else (0.0, 0.01), abs=1e-12)
+    assert (found.height_rms, found.odometry_share, found.nees) == (None, None, None)
+
+
+def test_what_the_robot_does_at_the_end_is_told() -> None:
+    decided = trace()
+    decided["behaviour"][:-1] = 1
+    assert metrics.behaviour_final(run_of(base(CONTROLLER_TRACE=decided))) == "stand"
+    assert metrics.behaviour_final(run_of(base())) is None
+
+
 def test_a_push_has_its_start_length_and_impulse() -> None:
     messages = truth()
     messages["push_W"][31:41] = 0.0, 30.0, 0.0  # means over the periods that end at 0.31 ... 0.40 s
