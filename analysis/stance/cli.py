@@ -209,23 +209,45 @@ def _export(options: argparse.Namespace) -> int:
     return GOOD
 
 
-def _study(options: argparse.Namespace) -> int:
+def _campaign(options: argparse.Namespace) -> int:
+    from .campaign import Request, as_text, run_campaign
     from .run import progress_bar
-    from .study import as_dict, as_text, standing_pushes, summarise
+    from .scoreboard import around, insert, keep, load, table
+    from .study import load_study
 
-    with progress_bar(options.silent) as progress:
-        trials = standing_pushes(
-            options.scenario,
-            options.scales,
-            options.moments,
-            options.seed,
-            with_steps=not options.without_steps,
-            workers=options.workers,
-            progress=progress,
-        )
-    cells = summarise(trials)
-    _print(options, as_dict(cells, trials), lambda: as_text(cells))
-    return GOOD if all(cell.survived == cell.trials for cell in cells) else LIMIT_VIOLATED
+    if options.summary and options.name:
+        raise StanceError("--summary keeps whole studies: leave out --name")
+    if options.table and not options.summary:
+        raise StanceError("--table is drawn from --summary: give both")
+    if options.summary and options.summary.exists():
+        load(options.summary)  # files that cannot be used are told before the campaign, not after it
+    if options.table:
+        around(options.table)
+    studies = [load_study(study, options.robot) for study in options.study]
+    request = Request(
+        output=options.output,
+        trials=options.trials,
+        seed=options.seed,
+        workers=options.workers,
+        names=tuple(options.name),
+        keep=options.keep,
+    )
+    outcomes = []
+    for number, study in enumerate(studies, 1):
+        _say(options, f"study {number} of {len(studies)}: {study.name}, {counted(len(study.cells), 'cell')}")
+        with progress_bar(options.silent, "trials") as progress:
+            outcome = run_campaign(study, request, progress, lambda line: _say(options, line))
+        outcomes.append(outcome)
+        if options.summary:
+            kept = keep(options.summary, [outcome])
+            if options.table:
+                insert(options.table, table(kept))
+        if not options.json and not options.silent:
+            print(as_text(outcome), flush=True)
+    met = all(outcome.met for outcome in outcomes)
+    if options.json:
+        print(to_json({"met": met, "studies": [outcome.as_dict() for outcome in outcomes]}))
+    return GOOD if met else LIMIT_VIOLATED
 
 
 def _doctor(options: argparse.Namespace) -> int:
@@ -353,13 +375,25 @@ def _parser() -> argparse.ArgumentParser:
     _add_log(export, with_run=True)
     export.add_argument("--out", type=Path, metavar="PATH", help="a directory, or the .mat file (default: by the log)")
 
-    study = add("study", _study, "Pushes on the standing biped, in 8 directions on an ellipse; exit 1 where it falls.")
-    study.add_argument("--scenario", default="stand", help="what the pushes are added to (default: stand)")
-    study.add_argument("--scales", nargs="+", type=_positive, default=[1.0], help="of the ellipse (0.8, 4) N s")
-    study.add_argument("--moments", type=_count, default=5, help="pushes in each direction (default: 5)")
-    study.add_argument("--seed", type=int, default=10_000, help="of the moments and the noise (default: 10000)")
-    study.add_argument("--without-steps", action="store_true", help="of a robot that never steps")
-    study.add_argument("--workers", type=_count, help="rollouts at once (default: one for each core)")
+    campaign = add("campaign", _campaign, "Runs studies: seeded rollouts on every core; exit 1 where less than asked.")
+    campaign.add_argument("--robot", default="biped", help="robots/<robot> (default: biped)")
+    campaign.add_argument(
+        "--study", nargs="+", required=True, metavar="S", help="sim/scenarios/<robot>/studies/<S>.yaml, or a .yaml file"
+    )
+    campaign.add_argument("--trials", type=_count, metavar="N", help="of each cell (default: what the study says)")
+    campaign.add_argument(
+        "--seed", type=_natural, default=1, help="of each cell's first trial; 10000 and up judge (default: 1)"
+    )
+    campaign.add_argument("--workers", type=_count, metavar="N", help="rollouts at once (default: one for each core)")
+    campaign.add_argument("--name", nargs="+", default=[], help="only these cells; patterns such as '*noisy'")
+    campaign.add_argument(
+        "--keep", type=_natural, metavar="N", help="failures of each cell whose log is kept (default: all)"
+    )
+    campaign.add_argument(
+        "--output", type=Path, metavar="DIR", default=Path("runs/campaigns"), help="where to (default: runs/campaigns)"
+    )
+    campaign.add_argument("--summary", type=Path, metavar="FILE", help="keep what came of it in this JSON file, too")
+    campaign.add_argument("--table", type=Path, metavar="FILE", help="and draw it between this Markdown file's marks")
 
     shell = add("shell", _shell, "A shell, or a command, in the network of a running `stance run` or `stance replay`.")
     shell.add_argument("--pid", type=int, help="of the process to join (default: the newest)")
@@ -404,6 +438,13 @@ def _count(text: str) -> int:
     value = int(text)
     if value < 1:
         raise argparse.ArgumentTypeError(f"{text} is below 1")
+    return value
+
+
+def _natural(text: str) -> int:
+    value = int(text)
+    if value < 0:
+        raise argparse.ArgumentTypeError(f"{text} is below 0")
     return value
 
 

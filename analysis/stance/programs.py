@@ -4,11 +4,17 @@ from __future__ import annotations
 
 import os
 import shutil
+from collections.abc import Sequence
 from pathlib import Path
 
 from .errors import MissingError
 
 SOURCE_TREE = Path(__file__).resolve().parents[2]
+
+
+def share_directory() -> Path:
+    """Where robots/ and sim/scenarios/ are: $STANCE_SHARE, else the source tree."""
+    return Path(os.environ.get("STANCE_SHARE", SOURCE_TREE))
 
 
 def find_program(name: str) -> Path:
@@ -26,6 +32,12 @@ def find_program(name: str) -> Path:
         where = f"in $STANCE_BIN_DIR ({chosen})" if chosen else "in build/release/bin nor on PATH"
         raise MissingError(f"{name} is not {where}: build the project, or set STANCE_BIN_DIR to where it is")
     return Path(on_path)
+
+
+def mortal(command: Sequence[str]) -> list[str]:
+    """The command line of a program that the kernel interrupts where this process dies without ending it."""
+    setpriv = shutil.which("setpriv")
+    return [setpriv, "--pdeathsig", "INT", "--", *command] if setpriv else list(command)
 
 
 def find_lcm_tool(name: str) -> Path:

@@ -19,7 +19,7 @@ from .configuration import option
 from .errors import RunError
 from .messages import SELF_TEST_CHANNEL, message_type
 from .network import LCM_URL, announced
-from .programs import find_lcm_tool, find_program
+from .programs import find_lcm_tool, find_program, mortal
 
 READY_TIMEOUT = 15.0  # s, for a program to show that it is there
 SILENCE_TIMEOUT = 20.0  # s without a ROBOT_STATE, after which a run is given up
@@ -278,12 +278,10 @@ class _Child:
     def __init__(self, name: str, command: list[str], directory: Path) -> None:
         self.name = name
         self.output = directory / f"{name}.txt"
-        # Its own session: Ctrl-C reaches this process alone, which ends the others in order. Where this process dies
-        # without doing so, the kernel interrupts them.
-        guard = [setpriv, "--pdeathsig", "INT", "--"] if (setpriv := shutil.which("setpriv")) else []
+        # Its own session: Ctrl-C reaches this process alone, which ends the others in order.
         with self.output.open("wb") as file:
             self.process = subprocess.Popen(
-                [*guard, *command], stdin=subprocess.DEVNULL, stdout=file, stderr=file, start_new_session=True
+                mortal(command), stdin=subprocess.DEVNULL, stdout=file, stderr=file, start_new_session=True
             )
 
     def stop(self) -> None:
@@ -362,19 +360,20 @@ class _Interruption:
 
 
 @contextlib.contextmanager
-def progress_bar(silent: bool) -> Iterator[Progress | None]:
-    """A progress bar on stderr for `record` and `replay`; none when `silent`."""
+def progress_bar(silent: bool, unit: str = "s") -> Iterator[Progress | None]:
+    """A progress bar on stderr for whatever tells how far it is, in seconds or another unit; none when `silent`."""
     if silent:
         yield None
         return
     from tqdm import tqdm
 
-    layout = "{l_bar}{bar}| {n:.1f}/{total:.1f} s [{elapsed}]"
+    digits = ".1f" if unit == "s" else ".0f"
+    layout = f"{{l_bar}}{{bar}}| {{n:{digits}}}/{{total:{digits}}} {unit} [{{elapsed}}]"
     with tqdm(total=0.0, bar_format=layout, disable=None) as bar:  # disable=None: only where stderr is a terminal
 
-        def show(simulated: float, duration: float | None) -> None:
-            bar.total = max(duration or 0.0, simulated)
-            bar.n = simulated
+        def show(done: float, of: float | None) -> None:
+            bar.total = max(of or 0.0, done)
+            bar.n = done
             bar.refresh()
 
         yield show

@@ -220,8 +220,10 @@ def test_limits_that_cannot_be_used_are_told_before_the_run(
         ["run", "--no-report", "--limits", "x"],
         ["replay", "x", "--speed", "-1"],
         ["plot", "x", "--list", "--only", "gait"],
-        ["study", "--moments", "0"],
-        ["study", "--workers", "-1"],
+        ["campaign"],
+        ["campaign", "--study", "x", "--trials", "0"],
+        ["campaign", "--study", "x", "--workers", "-1"],
+        ["campaign", "--study", "x", "--keep", "-1"],
     ],
 )
 def test_usage_errors_are_exit_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:

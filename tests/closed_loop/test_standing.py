@@ -10,15 +10,17 @@ from pathlib import Path
 
 import pytest
 import yaml
+from stance.campaign import Request, run_campaign
 from stance.check import judge, limits_file, load_limits
 from stance.log import Log
 from stance.metrics import measure
 from stance.programs import SOURCE_TREE, find_program
-from stance.study import DIRECTIONS, standing_pushes
+from stance.study import load_study
 
 TEN_MINUTES = 600.0  # s
 MAX_TILT = math.radians(2.0)  # of the trunk, left alone
-MOMENTS = 5  # of a push, for each direction
+DIRECTIONS = 8
+PUSH_SEED = 10_000  # of the first push; no tuning has seen it or the next
 DEMO_SEEDS = (10_000, 10_001, 10_002)  # that no tuning has seen
 DEMO_IMPULSES = [(0.5, 0.0, 0.0), (0.0, 3.0, 0.0)]  # N s
 
@@ -32,11 +34,14 @@ def ten_minutes() -> Iterator[subprocess.Popen[str]]:
         process.kill()
 
 
-@pytest.mark.parametrize("with_steps", [True, False])
-def test_forty_pushes_on_the_ellipse_are_survived(with_steps: bool) -> None:
-    trials = standing_pushes("stand", [1.0], MOMENTS, with_steps=with_steps)
-    assert len({(trial.direction, trial.moment) for trial in trials}) == DIRECTIONS * MOMENTS == 40
-    assert [trial for trial in trials if trial.fallen] == []
+@pytest.mark.parametrize("steps", ["without a step", "with capture steps"])
+def test_forty_pushes_on_the_ellipse_are_survived(steps: str, tmp_path: Path) -> None:
+    request = Request(tmp_path, seed=PUSH_SEED, names=(f"0.8 by 4 N s, {steps}",))
+    outcome = run_campaign(load_study("push_standing", "biped"), request)
+    (cell,) = outcome.cells
+    assert (cell.trials, cell.failures) == (40, [])
+    trials = [json.loads(line) for line in (Path(outcome.directory) / "trials.jsonl").read_text().splitlines()]
+    assert len({trial["rollout"]["drawn"]["pushes[1].force_W"] for trial in trials}) == DIRECTIONS
 
 
 @pytest.mark.parametrize("seed", DEMO_SEEDS)
