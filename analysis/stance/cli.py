@@ -274,17 +274,41 @@ def _info(options: argparse.Namespace) -> int:
     return GOOD
 
 
-def _shell(options: argparse.Namespace) -> int:
-    from .errors import MissingError
-    from .network import joining_command, residents
+def _command(options: argparse.Namespace) -> int:
+    from .command import Command, load_script, publish
+    from .network import connect, join, newest
+    from .run import Interruption
 
-    found = [resident for resident in residents() if options.pid in (None, resident.pid)]
-    if not found:
-        raise MissingError("no running stance process to join: start `stance run` or `stance replay` first")
+    given = (options.behaviour, options.vx, options.vy, options.yaw_rate, options.height)
+    if options.script is not None:
+        if given != (None,) * len(given):
+            raise StanceError("--script says it all: leave out the behaviour, velocities and height")
+        commands = load_script(options.script)
+    else:
+        behaviour = options.behaviour or "walk"
+        if behaviour != "walk" and given[1:4] != (None,) * 3:
+            raise StanceError(f"--behaviour {behaviour} has no velocity: leave out --vx, --vy and --yaw-rate")
+        vx, vy, yaw_rate, height = (value or 0.0 for value in given[1:])
+        commands = [Command(0.0, behaviour, (vx, vy), yaw_rate, height)]
+    url = options.lcm_url
+    if url is None:
+        run = newest(options.pid, ("stance run",))
+        join(run, options.restart)
+        url = run.url
+    with Interruption() as interruption:
+        sent = publish(commands, connect(url), options.duration, lambda: interruption.requested)
+    _print(options, {"sent": sent}, lambda: f"{counted(sent, 'command')} sent, the last one to stand")
+    return GOOD
+
+
+def _shell(options: argparse.Namespace) -> int:
+    from .network import joining_command, newest
+
+    found = newest(options.pid)
     words = options.words[1:] if options.words[:1] == ["--"] else options.words
-    command = joining_command(found[0], words or [os.environ.get("SHELL", "/bin/sh")])
-    os.environ["LCM_DEFAULT_URL"] = found[0].url
-    _say(options, f"in the network of {found[0].command} (pid {found[0].pid}); LCM_DEFAULT_URL is {found[0].url}")
+    command = joining_command(found, words or [os.environ.get("SHELL", "/bin/sh")])
+    os.environ["LCM_DEFAULT_URL"] = found.url
+    _say(options, f"in the network of {found.command} (pid {found.pid}); LCM_DEFAULT_URL is {found.url}")
     sys.stderr.flush()
     os.execvp(command[0], command)
 
@@ -395,6 +419,18 @@ def _parser() -> argparse.ArgumentParser:
     campaign.add_argument("--summary", type=Path, metavar="FILE", help="keep what came of it in this JSON file, too")
     campaign.add_argument("--table", type=Path, metavar="FILE", help="and draw it between this Markdown file's marks")
 
+    command = add("command", _command, "Commands a robot ten times a second until Ctrl-C, and then to stand.")
+    command.add_argument("--behaviour", choices=("walk", "stand", "lie-down"), help="(default: walk)")
+    command.add_argument("--vx", type=_finite, metavar="M/S", help="forward")
+    command.add_argument("--vy", type=_finite, metavar="M/S", help="to the left")
+    command.add_argument("--yaw-rate", type=_finite, metavar="RAD/S", help="to the left")
+    command.add_argument("--height", type=_finite, metavar="M", help="of the centre of mass over its nominal height")
+    command.add_argument("--script", type=Path, metavar="FILE", help="YAML: timed commands, as a scenario has them")
+    command.add_argument("--duration", type=_positive, metavar="S", help="seconds (default: until Ctrl-C)")
+    whom = command.add_mutually_exclusive_group()
+    whom.add_argument("--pid", type=int, help="of the `stance run` to command (default: the newest)")
+    whom.add_argument("--lcm-url", metavar="URL", help="of a robot, in place of a run")
+
     shell = add("shell", _shell, "A shell, or a command, in the network of a running `stance run` or `stance replay`.")
     shell.add_argument("--pid", type=int, help="of the process to join (default: the newest)")
     shell.add_argument("words", nargs=argparse.REMAINDER, metavar="COMMAND", help="instead of a shell")
@@ -431,6 +467,13 @@ def _positive(text: str) -> float:
     value = float(text)
     if not 0.0 < value < math.inf:
         raise argparse.ArgumentTypeError(f"{text} is not above 0")
+    return value
+
+
+def _finite(text: str) -> float:
+    value = float(text)
+    if not math.isfinite(value):
+        raise argparse.ArgumentTypeError(f"{text} is no number")
     return value
 
 

@@ -19,6 +19,7 @@ import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
+from typing import Any
 
 from .errors import MissingError
 
@@ -111,6 +112,16 @@ def ensure(mode: str, arguments: Sequence[str]) -> None:
     os.execvp(command[0], [*command, sys.executable, *arguments])
 
 
+def connect(url: str = LCM_URL) -> Any:
+    """An LCM. Raises MissingError where it cannot start."""
+    import lcm
+
+    try:
+        return lcm.LCM(url)
+    except RuntimeError as error:
+        raise MissingError(f"LCM cannot start on {url}: no multicast route here; try --network namespace") from error
+
+
 # ---- who lives in a namespace ----------------------------------------------------------------------------------------
 
 
@@ -181,6 +192,31 @@ def residents() -> list[Resident]:
         else:
             note.unlink(missing_ok=True)
     return sorted(found, key=lambda resident: resident.started, reverse=True)
+
+
+def newest(pid: int | None = None, commands: Sequence[str] = ("stance run", "stance replay")) -> Resident:
+    """The newest resident of one of these commands, or that of `pid`. Raises MissingError without one."""
+    for found in residents():
+        if found.command in commands and pid in (None, found.pid):
+            return found
+    which = "" if pid is None else f" of pid {pid}"
+    remedy = " or ".join(f"`{command}`" for command in commands)
+    raise MissingError(f"no running stance process{which} to join: start {remedy} first")
+
+
+def join(resident: Resident, arguments: Sequence[str]) -> None:
+    """Makes a resident's network this process's. Raises MissingError.
+
+    Where that is another one, this process is replaced: Python starts again in it, with these arguments.
+    """
+    here = [sys.executable, *arguments]
+    command = joining_command(resident, here)
+    if command == here:
+        return
+    os.environ[RUNTIME_DIRECTORY] = str(runtime_directory())
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os.execvp(command[0], command)
 
 
 def joining_command(resident: Resident, command: Sequence[str]) -> list[str]:

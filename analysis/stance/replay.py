@@ -16,7 +16,7 @@ from .errors import StanceError, UnreadableError
 from .events import Offsets
 from .log import Log
 from .messages import SELF_TEST_CHANNEL
-from .network import LCM_URL
+from .network import LCM_URL, connect
 from .programs import find_program
 
 VERIFIER = "stance-replay"
@@ -76,15 +76,10 @@ def replay(
     """Publishes the events `rows` (of `select`) at `speed` times their own pace, or as fast as possible where it is 0.
 
     Each message leaves at an absolute deadline, so that delays do not add up. `connection` takes the place of an LCM on
-    `url`. Raises StanceError where LCM cannot start.
+    `url`. Raises MissingError where LCM cannot start.
     """
     if connection is None:
-        import lcm
-
-        try:
-            connection = lcm.LCM(url)
-        except RuntimeError as error:
-            raise StanceError(f"LCM cannot start on {url}: no multicast route here; try --network namespace") from error
+        connection = connect(url)
     offset, length = log.index.data_offset[rows], log.index.data_length[rows]
     at = (log.index.time[rows] - log.index.time[rows[0]]) * 1e-6 if len(rows) else np.empty(0)
     names = np.empty(len(log.index), object)

@@ -18,7 +18,7 @@ from typing import Any
 from .configuration import option
 from .errors import RunError
 from .messages import SELF_TEST_CHANNEL, message_type
-from .network import LCM_URL, announced
+from .network import LCM_URL, announced, connect
 from .programs import find_lcm_tool, find_program, mortal
 
 READY_TIMEOUT = 15.0  # s, for a program to show that it is there
@@ -91,7 +91,6 @@ def record(request: RunRequest, progress: Progress | None = None) -> RunOutcome:
     RunError where there is a log already, or with what a program said last where one fails; of a run that fails before
     its first state no file stays. LCM's network must be usable (`stance.network.ensure`).
     """
-    import lcm
 
     programs = {name: find_program(name) for name in ("stance-controller", "stance-sim")}
     logger_program = find_lcm_tool("lcm-logger")
@@ -99,16 +98,11 @@ def record(request: RunRequest, progress: Progress | None = None) -> RunOutcome:
     if log.exists():
         raise RunError(f"{log} is there already: choose another --out, or remove it")
     request.out.mkdir(parents=True, exist_ok=True)
-    try:
-        listener = _Listener(lcm.LCM(request.url))
-    except RuntimeError as error:
-        raise RunError(
-            f"LCM cannot start on {request.url}: no multicast route here; try --network namespace"
-        ) from error
+    listener = _Listener(connect(request.url))
     with (
         _nothing_left_unless(lambda: "ROBOT_STATE" in listener.heard, request.out),
         announced("stance run", request.url),
-        _Interruption() as interruption,
+        Interruption() as interruption,
         _Children(request.out) as children,
     ):
         logger_options = ["--quiet", f"--lcm-url={_patient(request.url)}", str(log)]
@@ -189,7 +183,7 @@ def _follow(
     listener: _Listener,
     simulator: _Child,
     others: tuple[_Child, ...],
-    interruption: _Interruption,
+    interruption: Interruption,
     progress: Progress | None,
 ) -> int | None:
     """Waits for the simulator's end: its exit code, or None where the run was interrupted. Raises RunError."""
@@ -239,7 +233,7 @@ class _Listener:
                 break
         time.sleep(seconds)
 
-    def wait(self, ready: Callable[[], bool], child: _Child, interruption: _Interruption, otherwise: str) -> None:
+    def wait(self, ready: Callable[[], bool], child: _Child, interruption: Interruption, otherwise: str) -> None:
         """Returns when `ready`, or when interrupted. Raises RunError where the child ends or is not heard of."""
         deadline = time.monotonic() + READY_TIMEOUT
         while not ready():
@@ -334,14 +328,14 @@ class _Children:
             child.stop()
 
 
-class _Interruption:
+class Interruption:
     """Turns SIGINT and SIGTERM into a request that the run's own loop sees; a second one raises KeyboardInterrupt."""
 
     def __init__(self) -> None:
         self.requested = False
         self._before: dict[int, Any] = {}
 
-    def __enter__(self) -> _Interruption:
+    def __enter__(self) -> Interruption:
         if threading.current_thread() is threading.main_thread():
             for number in (signal.SIGINT, signal.SIGTERM):
                 self._before[number] = signal.signal(number, self._on_signal)

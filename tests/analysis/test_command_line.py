@@ -224,6 +224,9 @@ def test_limits_that_cannot_be_used_are_told_before_the_run(
         ["campaign", "--study", "x", "--trials", "0"],
         ["campaign", "--study", "x", "--workers", "-1"],
         ["campaign", "--study", "x", "--keep", "-1"],
+        ["command", "--vx", "inf"],
+        ["command", "--behaviour", "fly"],
+        ["command", "--lcm-url", "x", "--pid", "1"],
     ],
 )
 def test_usage_errors_are_exit_2(arguments: list[str], capsys: pytest.CaptureFixture[str]) -> None:
@@ -375,6 +378,54 @@ def test_ctrl_c_ends_every_process_and_leaves_a_readable_log_and_others_can_join
     assert not any(Path(f"/proc/{child}").exists() for child in children)
     assert Log.open(log).report.skipped == []
     assert stance.run("shell", "--", "true")[0] == 2
+
+
+def test_commands_reach_a_run_in_its_network_and_ctrl_c_ends_them_with_standing(stance: Stance) -> None:
+    process = stance.start("run", "--out", str(stance.out), "--no-report", FAKE_SIM="forever")
+    log = stance.out / "run.lcmlog"
+    while not (log.exists() and log.stat().st_size > 100_000):
+        assert process.poll() is None
+        time.sleep(0.05)
+    words = ["command", "--vx", "0.5", "--yaw-rate", "-0.2"]
+    code, out, err = stance.run(*words, "--duration", "0.5", "--json")
+    assert (code, json.loads(out)) == (0, {"sent": 6}), err
+    operator = stance.start(*words)
+    while log.read_bytes().count(b"USER_COMMAND") < 1 + 6 + 3:  # the simulator sends one, too
+        assert operator.poll() is None
+        time.sleep(0.05)
+    operator.send_signal(signal.SIGINT)
+    out, err = operator.communicate(timeout=30)
+    assert operator.returncode == 0, err
+    assert "the last one to stand" in out
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=30)
+    commands = Log.open(log).run().channels["USER_COMMAND"]
+    commands = commands.take(np.arange(1, len(commands)))
+    behaviour = commands.field("behaviour").tolist()
+    assert behaviour[:6] == [1, 1, 1, 1, 1, 0]
+    assert behaviour[6:] == [1] * (len(behaviour) - 7) + [0]
+    walking = commands.field("behaviour") == 1
+    assert (commands.field("velocity")[walking] == [0.5, 0.0]).all()
+    assert (commands.field("yaw_rate")[walking] == -0.2).all()
+    assert (np.diff(commands.field("seq")) > 0).all()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--vx", "1"], "no running stance process to join: start `stance run` first"),
+        (["--script", "absent.yaml"], "absent.yaml: No such file"),
+        (["--script", "absent.yaml", "--vx", "1"], "--script says it all"),
+        (["--behaviour", "stand", "--yaw-rate", "1"], "--behaviour stand has no velocity: leave out --vx"),
+    ],
+)
+def test_a_command_that_cannot_be_given_is_exit_2_and_one_line(
+    arguments: list[str], message: str, stance: Stance
+) -> None:
+    code, _, err = stance.run("command", *arguments)
+    assert code == 2
+    assert message in err
+    assert err.count("\n") == 1
 
 
 @pytest.mark.parametrize("player", ["stance replay", "lcm-logplayer"])
