@@ -5,6 +5,7 @@ A script is YAML, strict; its list is that of a scenario:
     commands:
       - {time: 0.0, behaviour: walk, velocity: [0.5, 0], yaw_rate: 0, height_offset: 0}    # s, -, m/s, rad/s, m
       - {time: 5.0, behaviour: walk, velocity: [0, 0], yaw_rate: 0.4, height_offset: 0}
+      - {time: 9.0, behaviour: silent}    # nothing is sent from here on
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ PERIOD = 0.1  # s, well within the time after which a controller no longer belie
 CHANNEL = "USER_COMMAND"
 TAG_SIZE = 16  # bytes of the message's tag, which has no use here
 BEHAVIOURS = ("stand", "walk", "lie-down", "track", "catch")
+SILENT = "silent"  # of who commands, not of the robot
 
 
 @dataclass(frozen=True)
@@ -33,6 +35,7 @@ class Command:
     time: float = 0.0
     """s, from the first message"""
     behaviour: str = "stand"
+    """one of BEHAVIOURS, or SILENT: nothing is sent"""
     velocity: tuple[float, float] = (0.0, 0.0)
     """m/s, forward and left, in the heading frame"""
     yaw_rate: float = 0.0
@@ -58,9 +61,13 @@ def load_script(path: Path) -> list[Command]:
 
 
 def _command(entry: Any, where: str) -> Command:
+    if isinstance(entry, dict) and entry.get("behaviour") == SILENT:
+        strict.mapping(entry, where, ("time", "behaviour"))
+        return Command(strict.number(entry["time"], f"{where}: time", 0.0), SILENT)
     strict.mapping(entry, where, ("time", "behaviour", "velocity", "yaw_rate", "height_offset"))
     if entry["behaviour"] not in BEHAVIOURS:
-        raise StanceError(f"{where}: behaviour is {entry['behaviour']!r}, but must be one of {', '.join(BEHAVIOURS)}")
+        known = ", ".join((*BEHAVIOURS, SILENT))
+        raise StanceError(f"{where}: behaviour is {entry['behaviour']!r}, but must be one of {known}")
     velocity = strict.sequence(entry["velocity"], f"{where}: velocity")
     if len(velocity) != 2:
         raise StanceError(f"{where}: velocity is {velocity!r}, but must have 2 numbers")
@@ -85,15 +92,16 @@ def publish(
     `commands` in order of time; `connection` is an LCM. Each message leaves at an absolute deadline. Returns how many
     were sent. However it ends, the last one is to stand.
     """
-    sent = 0
+    sent = periods = 0
     begun = time.monotonic()
     try:
-        while not stopped() and (duration is None or sent * PERIOD < duration - PERIOD / 2):
-            due = [command for command in commands if command.time <= sent * PERIOD + PERIOD / 2]
-            if due:
+        while not stopped() and (duration is None or periods * PERIOD < duration - PERIOD / 2):
+            due = [command for command in commands if command.time <= periods * PERIOD + PERIOD / 2]
+            if due and due[-1].behaviour != SILENT:
                 connection.publish(CHANNEL, encode(due[-1]))
-            sent += 1
-            time.sleep(max(0.0, begun + sent * PERIOD - time.monotonic()))
+                sent += 1
+            periods += 1
+            time.sleep(max(0.0, begun + periods * PERIOD - time.monotonic()))
     finally:
         connection.publish(CHANNEL, encode(Command()))
     return sent + 1

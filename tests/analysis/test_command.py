@@ -16,6 +16,7 @@ SCRIPT = """\
 commands:
   - {time: 0.2, behaviour: walk, velocity: [0.5, -0.1], yaw_rate: 0.3, height_offset: -0.05}
   - {time: 0.4, behaviour: lie-down, velocity: [0, 0], yaw_rate: 0, height_offset: 0}
+  - {time: 0.6, behaviour: silent}
 """
 
 
@@ -55,8 +56,8 @@ def test_its_numbers_grow_and_go_on_growing_in_the_next_program() -> None:
 
 def test_a_script_is_sent_at_its_times() -> None:
     recorder = Recorder()
-    publish(parse_script(SCRIPT, "script"), recorder, 0.6)
-    assert recorder.behaviours == [WALK, WALK, LIE_DOWN, LIE_DOWN, STAND]  # nothing before 0.2 s
+    assert publish(parse_script(SCRIPT, "script"), recorder, 0.8) == 5
+    assert recorder.behaviours == [WALK, WALK, LIE_DOWN, LIE_DOWN, STAND]  # nothing before 0.2 s, nor from 0.6 s on
     assert list(recorder.published[0].velocity) == [0.5, -0.1]
 
 
@@ -99,6 +100,7 @@ def test_a_scenarios_list_is_a_script(scenario: str) -> None:
         ("time: 0.2", "time: -1", "commands[0]: time is -1, but must be in [0, inf]"),
         ("time: 0.2, ", "", "commands[0]: time is missing"),
         ("behaviour: walk", "behaviour: run", "behaviour is 'run', but must be one of stand, walk, lie-down"),
+        ("behaviour: silent", "behaviour: silent, yaw_rate: 0", "commands[2]: unknown key yaw_rate"),
         ("[0.5, -0.1]", "[0.5]", "commands[0]: velocity is [0.5], but must have 2 numbers"),
         ("[0.5, -0.1]", "0.5", "commands[0]: velocity is 0.5, but must be a list"),
         ("yaw_rate: 0.3", "yaw_rate: .nan", "commands[0]: yaw_rate is nan, but must be a number"),
