@@ -7,6 +7,7 @@ Trial k of every cell has the seed `first seed + k`, so that cells compare pair 
     cells/          each cell's complete scenario, and its robot where that is not as it ships
     trials.jsonl    a line for each trial that is done, only ever added to: a campaign that was killed goes on after it
     failures/       the logs of trials that failed
+    logs/           those of trials that are running, where they are asked for
     summary.json    what came of it
 
 A result counts where program, robot, cell and scenario are the same: another program or robot has another directory,
@@ -173,7 +174,7 @@ def run_campaign(
     with _Store(program.directory) as store:
         for line in _unused(study, program, store):
             say(line)
-        campaign = _Campaign(study, chosen, request, program, store)
+        campaign = _Campaign(chosen, request, program, store)
         campaign.run(progress)
         tallies = campaign.tallies()
     outcome = Outcome(
@@ -364,8 +365,7 @@ class _Stopped(Exception):
 
 
 class _Campaign:
-    def __init__(self, study: Study, cells: Sequence[Cell], request: Request, program: _Program, store: _Store) -> None:
-        self._study = study
+    def __init__(self, cells: Sequence[Cell], request: Request, program: _Program, store: _Store) -> None:
         self._cells = cells
         self._request = request
         self._program = program
@@ -396,8 +396,11 @@ class _Campaign:
         done = len(trials) - len(to_do)
         if progress is not None:
             progress(done, len(trials))
-        with tempfile.TemporaryDirectory(dir=self._program.directory, prefix=".logs-") as logs, self._pool() as pool:
-            futures = [pool.submit(self._do, cell, seed, Path(logs)) for cell, seed in to_do]
+        logs = self._program.directory / "logs"
+        shutil.rmtree(logs, ignore_errors=True)  # what a kill left there
+        logs.mkdir()
+        with self._pool() as pool:
+            futures = [pool.submit(self._do, cell, seed, logs) for cell, seed in to_do]
             for future in as_completed(futures):
                 trial = future.result()
                 if (trial.key, trial.seed) not in self._store.trials:
@@ -405,9 +408,9 @@ class _Campaign:
                 done += 1
                 if progress is not None:
                     progress(done, len(trials))
+        logs.rmdir()
 
     def tallies(self) -> list[Tally]:
-        rates = {}
         trials = {
             cell.name: [self._store.trials[self._keys[cell.name], seed] for seed in self._seeds(cell)]
             for cell in self._cells

@@ -235,8 +235,12 @@ def _campaign(options: argparse.Namespace) -> int:
     outcomes = []
     for number, study in enumerate(studies, 1):
         _say(options, f"study {number} of {len(studies)}: {study.name}, {counted(len(study.cells), 'cell')}")
-        with progress_bar(options.silent, "trials") as progress:
-            outcome = run_campaign(study, request, progress, lambda line: _say(options, line))
+        try:
+            with progress_bar(options.silent, "trials") as progress:
+                outcome = run_campaign(study, request, progress, lambda line: _say(options, line))
+        except KeyboardInterrupt:
+            _say(options, "what is done stays done: the same command goes on from there")
+            raise
         outcomes.append(outcome)
         if options.summary:
             kept = keep(options.summary, [outcome])
