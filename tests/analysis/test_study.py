@@ -207,8 +207,8 @@ def test_what_is_wrong_is_told_in_one_line_with_its_place(old: str, new: str, me
 
 
 def test_the_readmes_example_is_a_study(tmp_path: Path) -> None:
-    example = (SOURCE_TREE / "README.md").read_text().split("```yaml\n")[1].split("```")[0]
-    cells = study_of(example, tmp_path).cells
+    example = (SOURCE_TREE / "README.md").read_text().split("```yaml\ntitle:")[1].split("```")[0]
+    cells = study_of(f"title:{example}", tmp_path).cells
     assert [cell.name for cell in cells] == ["6 N s", "6 N s, noisy", "10 N s", "10 N s, noisy"]
     assert cells[3].asked == Asked(within=0.05, of="10 N s")
 
