@@ -1,16 +1,14 @@
 #include "controller/behaviours/biped_config.hpp"
 
 #include <cmath>
-#include <stdexcept>
 #include <string>
+
+#include "controller/interface/require.hpp"
 
 namespace stance::behaviours {
 namespace {
 
-void require(bool good, const char* field, double value, const char* range) {
-  if (!good)
-    throw std::invalid_argument(std::string(field) + " is " + std::to_string(value) + ", but must be " + range);
-}
+constexpr Require require{""};
 
 }  // namespace
 

@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 #include <limits>
-#include <stdexcept>
-#include <string>
+
+#include "controller/interface/require.hpp"
 
 namespace stance::planning {
 namespace {
@@ -125,12 +125,7 @@ struct Search {
   }
 };
 
-void require(bool good, const char* field, double value, const char* range) {
-  if (!good) {
-    throw std::invalid_argument("footholds." + std::string(field) + " is " + std::to_string(value) + ", but must be " +
-                                range);
-  }
-}
+constexpr Require require{"footholds."};
 
 }  // namespace
 

@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
+
+#include "controller/interface/require.hpp"
 
 namespace stance::planning {
 namespace {
@@ -16,12 +16,7 @@ Vector2 in_heading(double yaw, const Vector2& v) noexcept {
 }
 Vector2 in_world(double yaw, const Vector2& v) noexcept { return in_heading(-yaw, v); }
 
-void require(bool good, const char* field, double value, const char* range) {
-  if (!good) {
-    throw std::invalid_argument("gait." + std::string(field) + " is " + std::to_string(value) + ", but must be " +
-                                range);
-  }
-}
+constexpr Require require{"gait."};
 
 }  // namespace
 

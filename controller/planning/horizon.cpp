@@ -2,13 +2,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
+
+#include "controller/interface/require.hpp"
 
 namespace stance::planning {
 namespace {
 
 constexpr double kRounding = 1e-6;  // s
+constexpr Require require{"horizon."};
 
 /// A gait that goes on without a robot, a control period at a time.
 struct Imagined {
@@ -79,12 +80,6 @@ struct Imagined {
 }  // namespace
 
 void HorizonConfig::validate() const {
-  const auto require = [](bool good, const char* field, int value, const char* range) {
-    if (!good) {
-      throw std::invalid_argument("horizon." + std::string(field) + " is " + std::to_string(value) + ", but must be " +
-                                  range);
-    }
-  };
   require(num_fine >= 1, "num_fine", num_fine, ">= 1");
   require(num_coarse >= 0, "num_coarse", num_coarse, ">= 0");
   require(coarse_periods >= 1 && coarse_periods <= 10, "coarse_periods", coarse_periods, "in 1..10");

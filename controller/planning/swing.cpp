@@ -2,8 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
+
+#include "controller/interface/require.hpp"
 
 namespace stance::planning {
 namespace {
@@ -22,12 +22,7 @@ void minimum_jerk(double target, double time, double dt, double& p, double& v, d
   p = p1;
 }
 
-void require(bool good, const char* field, double value, const char* range) {
-  if (!good) {
-    throw std::invalid_argument("swing." + std::string(field) + " is " + std::to_string(value) + ", but must be " +
-                                range);
-  }
-}
+constexpr Require require{"swing."};
 
 }  // namespace
 

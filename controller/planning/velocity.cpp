@@ -2,17 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <stdexcept>
-#include <string>
+
+#include "controller/interface/require.hpp"
 
 namespace stance::planning {
 namespace {
 
-void require(bool good, const char* field, double value, const char* range) {
-  if (!good)
-    throw std::invalid_argument("velocity." + std::string(field) + " is " + std::to_string(value) + ", but must be " +
-                                range);
-}
+constexpr Require require{"velocity."};
 
 }  // namespace
 
