@@ -5,6 +5,8 @@
 #include <span>
 #include <stdexcept>
 
+#include "controller/planning/heading.hpp"
+
 namespace stance::behaviours {
 namespace {
 
@@ -259,13 +261,10 @@ void BipedController::stand(const WalkInput& now, TickState& reference) noexcept
 
 void BipedController::choose_behaviour(const WalkInput& now) noexcept {
   const SteppingConfig& c = config_.stepping;
-  const double cosine = std::cos(now.rpy.z()), sine = std::sin(now.rpy.z());
-  const auto in_heading = [&](const Vector3& v) {
-    return Vector2(cosine * v.x() + sine * v.y(), -sine * v.x() + cosine * v.y());
-  };
+  const auto in_heading = [&](const Vector3& v) { return planning::in_heading(now.rpy.z(), v.head<2>()); };
   // The divergent component of motion from the middle of the feet, and the feet from each other.
   const Vector2 xi = in_heading(now.p_WC + now.v_WC / walk_.gait().omega() - 0.5 * (now.p_WF[0] + now.p_WF[1]));
-  const double pitch_soon = now.rpy.y() + c.capture_lead * (cosine * now.w_WB_W.y() - sine * now.w_WB_W.x());
+  const double pitch_soon = now.rpy.y() + c.capture_lead * in_heading(now.w_WB_W).y();
   const bool wanted = memory_.user_command.behaviour == Behaviour::kWalk;
   if (!memory_.stepping) {
     const bool pushed =

@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include "controller/planning/heading.hpp"
+
 namespace stance::behaviours {
 namespace {
 
@@ -11,8 +13,6 @@ constexpr int kFeet = 2;
 constexpr double kMaxStep = 0.1;        // s, longest time that one tick integrates over
 constexpr int kSettlingSteps = 2;       // touchdowns before the velocity's integral starts
 constexpr double kSameFoothold = 1e-9;  // m
-
-Vector2 heading(double yaw) noexcept { return {std::cos(yaw), std::sin(yaw)}; }
 
 }  // namespace
 
@@ -69,9 +69,7 @@ void Walk::enter(const WalkInput& input, int swing, double double_support) noexc
 void Walk::plan(const WalkInput& input, TickState& out) noexcept {
   const double dt = std::min(kControlPeriod * input.periods, kMaxStep);
   yaw_ = input.rpy.z();
-  const Vector2 forward = heading(velocity_.yaw());
-  const Vector2 measured(forward.dot(input.v_WC.head<2>()),
-                         Vector2(-forward.y(), forward.x()).dot(input.v_WC.head<2>()));
+  const Vector2 measured = planning::in_heading(velocity_.yaw(), input.v_WC.head<2>());
   velocity_.step(input.velocity, input.yaw_rate, measured, yaw_, gait_.state().steps > kSettlingSteps, dt);
   gait_.step(gait_input(input), dt);
   const planning::GaitState& gait = gait_.state();
@@ -89,7 +87,7 @@ void Walk::plan(const WalkInput& input, TickState& out) noexcept {
   ground_z_ = middle.z() - foot_radius_;
   const double offset_step = config_.height_offset_rate * dt;
   height_offset_ += std::clamp(input.height_offset - height_offset_, -offset_step, offset_step);
-  const Vector2 ahead = heading(velocity_.yaw());
+  const Vector2 ahead = planning::in_world(velocity_.yaw(), Vector2::UnitX());
   const auto height_at = [&](const Vector2& p) {
     return ground_z_ + nominal_height_ + height_offset_ + gait.slope * ahead.dot(p - middle.head<2>());
   };

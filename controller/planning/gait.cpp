@@ -4,17 +4,12 @@
 #include <cmath>
 
 #include "controller/interface/require.hpp"
+#include "controller/planning/heading.hpp"
 
 namespace stance::planning {
 namespace {
 
 constexpr double kRounding = 1e-6;  // s
-
-Vector2 in_heading(double yaw, const Vector2& v) noexcept {
-  const double c = std::cos(yaw), s = std::sin(yaw);
-  return {c * v.x() + s * v.y(), -s * v.x() + c * v.y()};
-}
-Vector2 in_world(double yaw, const Vector2& v) noexcept { return in_heading(-yaw, v); }
 
 constexpr Require require{"gait."};
 

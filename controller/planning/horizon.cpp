@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "controller/interface/require.hpp"
+#include "controller/planning/heading.hpp"
 
 namespace stance::planning {
 namespace {
@@ -46,8 +47,7 @@ struct Imagined {
     FootholdProblem problem = gait.problem(com, support_foot(), swing_foot(), swing, velocity, yaw);
     problem.time = time;
     const Vector2 u = foothold_at(gait.config().footholds, problem, swing_time, 0);
-    const double c = std::cos(yaw), s = std::sin(yaw);
-    foothold = support_foot() + Vector2(c * u.x() - s * u.y(), s * u.x() + c * u.y());
+    foothold = support_foot() + in_world(yaw, u);
     planned = true;
   }
 
