@@ -12,10 +12,20 @@ constexpr Require require{""};
 
 }  // namespace
 
+void HeightConfig::validate() const {
+  require(integral_gain >= 0.0, "height.integral_gain", integral_gain, ">= 0");
+  require(integral_limit >= 0.0, "height.integral_limit", integral_limit, ">= 0 m");
+  require(offset_rate > 0.0, "height.offset_rate", offset_rate, "> 0 m/s");
+  const auto [lowest, highest] = offset_range;
+  require(lowest <= 0.0, "height.offset_range's least", lowest, "<= 0 m");
+  require(highest >= 0.0, "height.offset_range's greatest", highest, ">= 0 m");
+}
+
 void BipedConfig::validate() const {
   estimator.validate();
   com_offset_observer.validate();
   force_qp.validate();
+  height.validate();
   fault_ladder.validate();
   validation.validate();
   require(std::abs(last_link_pitch) < 1.5, "last_link_pitch", last_link_pitch, "within 1.5 rad of zero");
@@ -28,12 +38,6 @@ void BipedConfig::validate() const {
           ("in 1.." + std::to_string(kMaxPlanStages)).c_str());
   require(stand.state_weights.minCoeff() >= 0.0, "stand.state_weights' least", stand.state_weights.minCoeff(), ">= 0");
   require(stand.force_weight > 0.0, "stand.force_weight", stand.force_weight, "> 0");
-  require(stand.height_integral_gain >= 0.0, "stand.height_integral_gain", stand.height_integral_gain, ">= 0");
-  require(stand.height_integral_limit >= 0.0, "stand.height_integral_limit", stand.height_integral_limit, ">= 0 m");
-  require(stand.height_offset_rate > 0.0, "stand.height_offset_rate", stand.height_offset_rate, "> 0 m/s");
-  const auto [lowest, highest] = stand.height_offset_range;
-  require(lowest <= 0.0, "stand.height_offset_range's least", lowest, "<= 0 m");
-  require(highest >= 0.0, "stand.height_offset_range's greatest", highest, ">= 0 m");
   require(torque_map.null_space_kp >= 0.0, "torque_map.null_space_kp", torque_map.null_space_kp, ">= 0");
   require(torque_map.null_space_kd >= 0.0, "torque_map.null_space_kd", torque_map.null_space_kd, ">= 0");
   walk.horizon.validate();
@@ -46,9 +50,6 @@ void BipedConfig::validate() const {
   require(walk.recovery_weights.minCoeff() >= 0.0, "walk.recovery_weights' least", walk.recovery_weights.minCoeff(),
           ">= 0");
   require(walk.force_weight > 0.0, "walk.force_weight", walk.force_weight, "> 0");
-  require(walk.height_integral_gain >= 0.0, "walk.height_integral_gain", walk.height_integral_gain, ">= 0");
-  require(walk.height_integral_limit >= 0.0, "walk.height_integral_limit", walk.height_integral_limit, ">= 0 m");
-  require(walk.height_offset_rate > 0.0, "walk.height_offset_rate", walk.height_offset_rate, "> 0 m/s");
   require(stepping.capture.minCoeff() > 0.0, "stepping.capture's least", stepping.capture.minCoeff(), "> 0 m");
   require(stepping.capture_pitch > 0.0, "stepping.capture_pitch", stepping.capture_pitch, "> 0 rad");
   require(stepping.capture_lead >= 0.0, "stepping.capture_lead", stepping.capture_lead, ">= 0 s");

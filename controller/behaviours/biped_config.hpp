@@ -1,5 +1,6 @@
 #pragma once
 // All that robots/biped/biped.yaml says under `controller`: one struct a module, each with its own validate().
+#include "controller/behaviours/height.hpp"
 #include "controller/estimation/base_estimator.hpp"
 #include "controller/estimation/com_offset_observer.hpp"
 #include "controller/force_qp/force_qp.hpp"
@@ -21,10 +22,6 @@ struct StandConfig {
   int stages = 1;                                           ///< N, of kControlPeriod each
   CentroidalState state_weights = CentroidalState::Zero();  ///< Q's diagonal
   double force_weight = 0.0;                                ///< R's diagonal
-  double height_integral_gain = 0.0;                        ///< 1/s
-  double height_integral_limit = 0.0;                       ///< m
-  double height_offset_rate = 0.0;                          ///< m/s, at which the height follows the operator's
-  std::array<double, 2> height_offset_range{};              ///< m, that an operator may ask for
 };
 
 struct WalkConfig {
@@ -35,9 +32,6 @@ struct WalkConfig {
   CentroidalState state_weights = CentroidalState::Zero();     ///< Q's diagonal, per control period
   CentroidalState recovery_weights = CentroidalState::Zero();  ///< the same while recovering
   double force_weight = 0.0;                                   ///< R's diagonal, per control period
-  double height_integral_gain = 0.0;                           ///< 1/s
-  double height_integral_limit = 0.0;                          ///< m
-  double height_offset_rate = 0.0;                             ///< m/s
 };
 
 /// When a standing robot takes a step, and when a stepping one stands again.
@@ -72,6 +66,7 @@ struct BipedConfig {
   double com_offset_quiet_momentum = 0.0;  ///< kg m^2/s, about C, above which the observer waits
   force_qp::Settings force_qp;
   ForceLimits force_limits;
+  HeightConfig height;
   StandConfig stand;
   WalkConfig walk;
   SteppingConfig stepping;

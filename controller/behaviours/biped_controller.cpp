@@ -10,8 +10,6 @@
 namespace stance::behaviours {
 namespace {
 
-constexpr double kMaxObserverStep = 0.1;  // s, longest time that one tick observes over
-
 std::array<rigid_body::Foot, 2> two_feet(const std::vector<rigid_body::Foot>& feet) {
   if (feet.size() != 2) {
     throw std::invalid_argument("a biped has 2 feet, the robot has " + std::to_string(feet.size()));
@@ -62,10 +60,10 @@ BipedController::BipedController(const BipedConfig& config, const rigid_body::Mo
       stand_([&] {
         config.validate();
         const Nominal nominal = nominal_posture(model_, feet_, nominal_joint_position);
-        return Stand(config.stand, config.force_limits, config.force_qp, model_.total_mass,
+        return Stand(config.stand, config.height, config.force_limits, config.force_qp, model_.total_mass,
                      kinematics::standing_inertia(model_, feet_, nominal_joint_position), nominal.r, nominal.height);
       }()),
-      walk_(config.walk, config.force_limits, config.force_qp, model_.total_mass,
+      walk_(config.walk, config.height, config.force_limits, config.force_qp, model_.total_mass,
             kinematics::stepping_inertia(model_, feet_, nominal_joint_position),
             nominal_posture(model_, feet_, nominal_joint_position).height, legs_[0].p_BL.y(), feet_[0].radius) {
   start_run(0);
@@ -146,8 +144,8 @@ void BipedController::take_command(const TickInput& input) noexcept {
   memory_.user_command_age += input.periods;
   if (command.seq != taken.seq) {
     const bool offered = (command.behaviour == Behaviour::kStand || command.behaviour == Behaviour::kWalk) &&
-                         command.height_offset >= config_.stand.height_offset_range[0] &&
-                         command.height_offset <= config_.stand.height_offset_range[1];
+                         command.height_offset >= config_.height.offset_range[0] &&
+                         command.height_offset <= config_.height.offset_range[1];
     if (safety::command_is_plausible(command) && offered) {
       taken = command;
       memory_.user_command_age = 0;
@@ -227,7 +225,7 @@ void BipedController::plan(int periods, const RobotState& state, Trace& trace) n
   // A push turns the robot about its feet as an offset would: look only while the robot is quiet.
   seen.standing = !memory_.stepping && base.contact[0] && base.contact[1] &&
                   body_.centroidal.L_C_W.head<2>().norm() < config_.com_offset_quiet_momentum;
-  now.p_WC = seen.p_WC + observer_.step(seen, std::min(kControlPeriod * periods, kMaxObserverStep));
+  now.p_WC = seen.p_WC + observer_.step(seen, tick_duration(periods));
 
   choose_behaviour(now);
   TickState reference;

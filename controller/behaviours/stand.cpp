@@ -7,7 +7,6 @@ namespace stance::behaviours {
 namespace {
 
 constexpr int kFeet = 2;
-constexpr double kMaxStep = 0.1;  // s, longest time that one tick integrates over
 
 /// p, omega and v turned by R; theta as it is.
 CentroidalState rotated(const Matrix3& R, const CentroidalState& x) noexcept {
@@ -18,9 +17,10 @@ CentroidalState rotated(const Matrix3& R, const CentroidalState& x) noexcept {
 
 }  // namespace
 
-Stand::Stand(const StandConfig& config, const ForceLimits& limits, const force_qp::Settings& qp, double mass,
-             const Matrix3& inertia, const std::array<Vector3, 2>& nominal_r, double nominal_height)
-    : config_(config),
+Stand::Stand(const StandConfig& config, const HeightConfig& height, const ForceLimits& limits,
+             const force_qp::Settings& qp, double mass, const Matrix3& inertia, const std::array<Vector3, 2>& nominal_r,
+             double nominal_height)
+    : height_(height),
       parameters_{mass, inertia},
       nominal_height_(nominal_height),
       inertia_inverse_(inertia.inverse()),
@@ -51,26 +51,21 @@ Stand::Stand(const StandConfig& config, const ForceLimits& limits, const force_q
 }
 
 void Stand::enter() noexcept {
-  height_integral_ = 0.0;
-  height_offset_ = 0.0;
+  height_.reset();
   qp_->reset();
 }
 
 void Stand::plan(const StandInput& input, TickState& out) noexcept {
-  const double dt = std::min(kControlPeriod * input.periods, kMaxStep);
-  const double offset_step = config_.height_offset_rate * dt;
-  height_offset_ += std::clamp(input.height_offset - height_offset_, -offset_step, offset_step);
+  const double dt = tick_duration(input.periods);
   p_WG_ = input.p_WG;
   const Vector3 middle = 0.5 * (p_WG_[0] + p_WG_[1]);
-  const double height_ref = middle.z() + nominal_height_ + height_offset_;
-  height_integral_ += config_.height_integral_gain * dt * (height_ref - input.p_WC.z());
-  height_integral_ = std::clamp(height_integral_, -config_.height_integral_limit, config_.height_integral_limit);
+  const double height_ref = middle.z() + nominal_height_ + height_.offset(input.height_offset, dt);
 
   // Square to the feet, whatever the estimated yaw drifts by.
   const Vector3 feet = p_WG_[0] - p_WG_[1];
   yaw_ref_ = math::unwrap(std::atan2(-feet.x(), feet.y()), input.rpy.z());
   R_WH_ = math::rotation_z(yaw_ref_);
-  p_ref_W_ = {middle.x(), middle.y(), height_ref + height_integral_};
+  p_ref_W_ = {middle.x(), middle.y(), height_ref + height_.integral(height_ref - input.p_WC.z(), dt)};
   // The trunk's angular velocity that carries the whole robot's angular momentum.
   const Vector3 omega_W = R_WH_ * (inertia_inverse_ * (R_WH_.transpose() * input.L_C_W));
   out.x << input.rpy, input.p_WC, omega_W, input.v_WC;

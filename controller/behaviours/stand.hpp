@@ -29,8 +29,8 @@ struct StandInput {
 class Stand {
  public:
   /// `nominal_height` [m]: of C over the ground; `inertia` [kg m^2]: I_eff in H. Throws std::invalid_argument.
-  Stand(const StandConfig& config, const ForceLimits& limits, const force_qp::Settings& qp, double mass,
-        const Matrix3& inertia, const std::array<Vector3, 2>& nominal_r, double nominal_height);
+  Stand(const StandConfig& config, const HeightConfig& height, const ForceLimits& limits, const force_qp::Settings& qp,
+        double mass, const Matrix3& inertia, const std::array<Vector3, 2>& nominal_r, double nominal_height);
 
   /// Takes up the stance: the height integral starts here.
   void enter() noexcept;
@@ -42,7 +42,7 @@ class Stand {
   QpStatus solve(ForcePlan& plan, Trace& trace) noexcept;
 
  private:
-  StandConfig config_;
+  Height height_;
   centroidal::Parameters parameters_;
   double nominal_height_;
   Matrix3 inertia_inverse_;
@@ -51,8 +51,6 @@ class Stand {
   std::unique_ptr<force_qp::ForceQp> qp_;
 
   double yaw_ref_ = 0.0;
-  double height_integral_ = 0.0;
-  double height_offset_ = 0.0;
   Matrix3 R_WH_ = Matrix3::Identity();
   Vector3 p_ref_W_ = Vector3::Zero();
   ContactVectors p_WG_ = zero_contact_vectors();

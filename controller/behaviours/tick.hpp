@@ -10,6 +10,9 @@ struct TickState {
   CentroidalState x_ref = CentroidalState::Zero();
 };
 
+/// [s] that one tick integrates over, after `periods` control periods: no more than ten.
+constexpr double tick_duration(int periods) noexcept { return kControlPeriod * (periods < 10 ? periods : 10); }
+
 /// Writes a solve into the trace.
 inline void note(const force_qp::Solution& solution, Trace& trace) noexcept {
   trace.qp_engine = solution.engine;

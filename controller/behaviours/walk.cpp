@@ -10,15 +10,16 @@ namespace stance::behaviours {
 namespace {
 
 constexpr int kFeet = 2;
-constexpr double kMaxStep = 0.1;        // s, longest time that one tick integrates over
 constexpr int kSettlingSteps = 2;       // touchdowns before the velocity's integral starts
 constexpr double kSameFoothold = 1e-9;  // m
 
 }  // namespace
 
-Walk::Walk(const WalkConfig& config, const ForceLimits& limits, const force_qp::Settings& qp, double mass,
-           const Matrix3& inertia, double nominal_height, double hip_lateral, double foot_radius)
+Walk::Walk(const WalkConfig& config, const HeightConfig& height, const ForceLimits& limits,
+           const force_qp::Settings& qp, double mass, const Matrix3& inertia, double nominal_height, double hip_lateral,
+           double foot_radius)
     : config_(config),
+      height_(height),
       limits_(limits),
       parameters_{mass, inertia},
       nominal_height_(nominal_height),
@@ -59,15 +60,14 @@ int Walk::better_swing(const WalkInput& input, double double_support) const noex
 }
 
 void Walk::enter(const WalkInput& input, int swing, double double_support) noexcept {
-  height_integral_ = 0.0;
-  height_offset_ = 0.0;
+  height_.reset();
   velocity_.reset(input.rpy.z());
   gait_.start(swing, double_support, gait_input(input));
   qp_->reset();
 }
 
 void Walk::plan(const WalkInput& input, TickState& out) noexcept {
-  const double dt = std::min(kControlPeriod * input.periods, kMaxStep);
+  const double dt = tick_duration(input.periods);
   yaw_ = input.rpy.z();
   const Vector2 measured = planning::in_heading(velocity_.yaw(), input.v_WC.head<2>());
   velocity_.step(input.velocity, input.yaw_rate, measured, yaw_, gait_.state().steps > kSettlingSteps, dt);
@@ -85,14 +85,12 @@ void Walk::plan(const WalkInput& input, TickState& out) noexcept {
   }
   middle /= standing;
   ground_z_ = middle.z() - foot_radius_;
-  const double offset_step = config_.height_offset_rate * dt;
-  height_offset_ += std::clamp(input.height_offset - height_offset_, -offset_step, offset_step);
+  const double offset = height_.offset(input.height_offset, dt);
   const Vector2 ahead = planning::in_world(velocity_.yaw(), Vector2::UnitX());
   const auto height_at = [&](const Vector2& p) {
-    return ground_z_ + nominal_height_ + height_offset_ + gait.slope * ahead.dot(p - middle.head<2>());
+    return ground_z_ + nominal_height_ + offset + gait.slope * ahead.dot(p - middle.head<2>());
   };
-  height_integral_ += config_.height_integral_gain * dt * (height_at(input.p_WC.head<2>()) - input.p_WC.z());
-  height_integral_ = std::clamp(height_integral_, -config_.height_integral_limit, config_.height_integral_limit);
+  const double integral = height_.integral(height_at(input.p_WC.head<2>()) - input.p_WC.z(), dt);
 
   const double weight = parameters_.mass * kGravity;
   double time = 0.0;
@@ -101,7 +99,7 @@ void Walk::plan(const WalkInput& input, TickState& out) noexcept {
     force_qp::StageData& stage = problem_.stages[k];
     time += from.duration;
     stage.x_ref << 0.0, 0.0, velocity_.yaw() + velocity_.yaw_rate() * time, from.end.p,
-        height_at(from.end.p) + height_integral_, 0.0, 0.0, velocity_.yaw_rate(), from.end.v,
+        height_at(from.end.p) + integral, 0.0, 0.0, velocity_.yaw_rate(), from.end.v,
         gait.slope * ahead.dot(from.end.v);
     const double scale = from.duration / kControlPeriod;
     stage.Q = scale * (gait.recovering ? config_.recovery_weights : config_.state_weights);

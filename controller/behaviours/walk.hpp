@@ -34,8 +34,8 @@ class Walk {
  public:
   /// `nominal_height` [m]: of C over the ground; `inertia` [kg m^2]: I_eff on one foot, in H; `hip_lateral` [m]: of a
   /// hip from the trunk's middle. Throws std::invalid_argument.
-  Walk(const WalkConfig& config, const ForceLimits& limits, const force_qp::Settings& qp, double mass,
-       const Matrix3& inertia, double nominal_height, double hip_lateral, double foot_radius);
+  Walk(const WalkConfig& config, const HeightConfig& height, const ForceLimits& limits, const force_qp::Settings& qp,
+       double mass, const Matrix3& inertia, double nominal_height, double hip_lateral, double foot_radius);
 
   /// The foot whose swing, after `double_support` [s], promises the better footholds.
   int better_swing(const WalkInput& input, double double_support) const noexcept;
@@ -59,6 +59,7 @@ class Walk {
   planning::GaitInput gait_input(const WalkInput& input) const noexcept;
 
   WalkConfig config_;
+  Height height_;
   ForceLimits limits_;
   centroidal::Parameters parameters_;
   double nominal_height_, foot_radius_;
@@ -70,8 +71,6 @@ class Walk {
   std::unique_ptr<force_qp::ForceQp> qp_;
 
   double yaw_ = 0.0;
-  double height_integral_ = 0.0;
-  double height_offset_ = 0.0;
   double ground_z_ = 0.0;  // m, under the standing feet
   ContactVectors p_WG_ = zero_contact_vectors();
 };

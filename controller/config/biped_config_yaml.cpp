@@ -61,17 +61,23 @@ void force_qp(StrictYaml yaml, force_qp::Settings& settings, behaviours::ForceLi
   yaml.finish();
 }
 
+behaviours::HeightConfig height(StrictYaml yaml) {
+  behaviours::HeightConfig c;
+  c.integral_gain = yaml.number("integral_gain");
+  c.integral_limit = yaml.number("integral_limit");
+  c.offset_rate = yaml.number("offset_rate");
+  const auto range = yaml.numbers("offset_range", 2);
+  c.offset_range = {range[0], range[1]};
+  yaml.finish();
+  return c;
+}
+
 behaviours::StandConfig stand(StrictYaml yaml) {
   behaviours::StandConfig c;
   c.stages = yaml.integer("stages");
   const auto weights = yaml.numbers("state_weights", 12);
   c.state_weights = Eigen::Map<const CentroidalState>(weights.data());
   c.force_weight = yaml.number("force_weight");
-  c.height_integral_gain = yaml.number("height_integral_gain");
-  c.height_integral_limit = yaml.number("height_integral_limit");
-  c.height_offset_rate = yaml.number("height_offset_rate");
-  const auto range = yaml.numbers("height_offset_range", 2);
-  c.height_offset_range = {range[0], range[1]};
   yaml.finish();
   return c;
 }
@@ -171,9 +177,6 @@ behaviours::WalkConfig walk(StrictYaml yaml) {
   c.state_weights = Eigen::Map<const CentroidalState>(weights.data());
   c.recovery_weights = Eigen::Map<const CentroidalState>(recovery.data());
   c.force_weight = yaml.number("force_weight");
-  c.height_integral_gain = yaml.number("height_integral_gain");
-  c.height_integral_limit = yaml.number("height_integral_limit");
-  c.height_offset_rate = yaml.number("height_offset_rate");
   yaml.finish();
   return c;
 }
@@ -227,6 +230,7 @@ behaviours::BipedConfig biped_config(const RobotDescription& robot) {
   c.estimator = estimator(yaml.mapping("estimator"));
   c.com_offset_observer = com_offset_observer(yaml.mapping("com_offset_observer"), c.com_offset_quiet_momentum);
   force_qp(yaml.mapping("force_qp"), c.force_qp, c.force_limits);
+  c.height = height(yaml.mapping("height"));
   c.stand = stand(yaml.mapping("stand"));
   c.walk = walk(yaml.mapping("walk"));
   c.stepping = stepping(yaml.mapping("stepping"));

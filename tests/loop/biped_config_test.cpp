@@ -108,7 +108,7 @@ TEST_CASE("AnyKeyOfTheControllersSectionThatIsMissingIsNamed") {
 
 TEST_CASE("AnUnknownKeyInAnyMappingOfTheControllersSectionIsNamed") {
   const std::vector<Mapping> mappings = controller_mappings();
-  CHECK(mappings.size() == 14);
+  CHECK(mappings.size() == 15);
   for (const Mapping& mapping : mappings) {
     const std::string text = edited(mapping.steps, [](YAML::Node& node) { node["surprise"] = 1; });
     CAPTURE(mapping.path);
@@ -164,13 +164,13 @@ TEST_CASE("AValueOutOfRangeIsRefusedByItsName") {
       Case{"force_qp.max_dual_residual", "0", "max_dual_residual"},
       Case{"stand.stages", "0", "stages"},
       Case{"stand.stages", "33", "stages"},
-      Case{"stand.height_offset_rate", "0", "height_offset_rate"},
-      Case{"stand.height_offset_range", "[0.1, 0.2]", "height_offset_range"},
-      Case{"stand.height_offset_range", "[-0.2, -0.1]", "height_offset_range"},
+      Case{"height.offset_rate", "0", "height.offset_rate"},
+      Case{"height.offset_range", "[0.1, 0.2]", "height.offset_range"},
+      Case{"height.offset_range", "[-0.2, -0.1]", "height.offset_range"},
       Case{"stand.state_weights", "[1, 1, 1, 1, 1, 1, 1, 1, 1, 1, 1, -1]", "state_weights"},
       Case{"stand.force_weight", "0", "force_weight"},
-      Case{"stand.height_integral_gain", "-1", "height_integral_gain"},
-      Case{"stand.height_integral_limit", "-1", "height_integral_limit"},
+      Case{"height.integral_gain", "-1", "height.integral_gain"},
+      Case{"height.integral_limit", "-1", "height.integral_limit"},
       Case{"walk.horizon.num_fine", "0", "num_fine"},
       Case{"walk.horizon.num_coarse", "23", "horizon"},
       Case{"walk.horizon.coarse_periods", "11", "coarse_periods"},

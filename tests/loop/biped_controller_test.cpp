@@ -365,8 +365,8 @@ TEST_CASE("AUserCommandThatIsUnknownNotOfferedNotFiniteOrOutOfRangeIsCountedOnce
       [](user_command_t& c) { c.velocity[1] = kInfinity; },
       [](user_command_t& c) { c.yaw_rate = kNan; },
       [](user_command_t& c) { c.height_offset = kInfinity; },
-      [](user_command_t& c) { c.height_offset = configuration().stand.height_offset_range[0] - 1e-6; },
-      [](user_command_t& c) { c.height_offset = configuration().stand.height_offset_range[1] + 1e-6; },
+      [](user_command_t& c) { c.height_offset = configuration().height.offset_range[0] - 1e-6; },
+      [](user_command_t& c) { c.height_offset = configuration().height.offset_range[1] + 1e-6; },
   };
   BipedRig undisturbed;
   undisturbed.tick_times(kSettled + 10);
@@ -389,7 +389,7 @@ TEST_CASE("AUserCommandThatIsUnknownNotOfferedNotFiniteOrOutOfRangeIsCountedOnce
 
 TEST_CASE("AHeightThatTheOperatorWantsIsTakenToTheEndsOfItsRange") {
   constexpr double tolerance = 0.005;  // m
-  const auto [lowest, highest] = configuration().stand.height_offset_range;
+  const auto [lowest, highest] = configuration().height.offset_range;
   for (const double wanted : {lowest, -0.03, highest}) {
     CAPTURE(wanted);
     BipedRig rig;
