@@ -155,10 +155,15 @@ void FootholdConfig::validate() const {
   require(crossing_threshold >= 0.0, "crossing_threshold", crossing_threshold, ">= 0");
 }
 
+double steady_width(const FootholdConfig& config, const Vector2& velocity) noexcept {
+  const double period = config.swing_time + config.double_support;
+  return std::max(config.step_width, config.path_clearance + std::abs(velocity.y()) * period);
+}
+
 Vector2 steady_offset(const FootholdConfig& config, double omega, const Vector2& velocity, double side) noexcept {
   const double period = config.swing_time + config.double_support;
   const double growth = std::exp(omega * period);
-  return velocity * (period / (growth - 1.0)) + Vector2(0.0, -side * config.step_width / (1.0 + growth));
+  return velocity * (period / (growth - 1.0)) + Vector2(0.0, -side * steady_width(config, velocity) / (1.0 + growth));
 }
 
 FootholdPlan plan_footholds(const FootholdConfig& config, const FootholdProblem& problem) noexcept {

@@ -61,6 +61,10 @@ struct FootholdPlan {
   int crossing = 0;  ///< 0 own side, +1 in front of the stance foot, -1 behind it
 };
 
+/// Lateral distance [m] between the feet's lines of a steady gait: sideways, the foot that follows keeps path_clearance
+/// from the other one.
+double steady_width(const FootholdConfig& config, const Vector2& velocity) noexcept;
+
 /// b [m] of a steady gait with swing foot's side `side`, per swing of `config.swing_time`.
 Vector2 steady_offset(const FootholdConfig& config, double omega, const Vector2& velocity, double side) noexcept;
 

@@ -27,13 +27,16 @@ FootholdProblem pushed(const Vector2& velocity, double side = 1.0, double time =
 TEST_CASE("ASteadyGaitIsGoneOnWith") {
   const double period = config().swing_time + config().double_support;
   for (const double side : {1.0, -1.0}) {
-    for (const Vector2& velocity : {Vector2(0.0, 0.0), Vector2(0.4, 0.0), Vector2(-0.3, 0.1), Vector2(0.0, -0.1)}) {
+    for (const Vector2& velocity : {Vector2(0.0, 0.0), Vector2(0.4, 0.0), Vector2(-0.3, 0.1), Vector2(0.0, -0.1),
+                                    Vector2(0.0, 0.5), Vector2(0.3, -0.5)}) {
       for (const double time : {0.0, 0.05, 0.1}) {
         CAPTURE(side, velocity.transpose(), time);
         const FootholdPlan plan = plan_footholds(config(), steady(side, time, velocity));
         CHECK(std::abs(plan.swing_time - config().swing_time) < kExact);
         CHECK(std::abs(plan.next_swing_time - config().swing_time) < kExact);
-        CHECK((plan.foothold - velocity * period - Vector2(0.0, side * config().step_width)).norm() < kExact);
+        CHECK((plan.foothold - velocity * period - Vector2(0.0, side * steady_width(config(), velocity))).norm() <
+              kExact);
+        CHECK(side * plan.foothold.y() > config().path_clearance - kExact);
         CHECK(plan.deviation < kExact);
         CHECK(plan.next_deviation < kExact);
         CHECK(plan.crossing == 0);

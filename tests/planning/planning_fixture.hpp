@@ -30,12 +30,13 @@ inline FootholdProblem steady(double side, double time, const Vector2& velocity 
   // At the last change of support, half a double support before lift-off.
   const double period = c.swing_time + c.double_support, growth = std::exp(omega() * period);
   const Vector2 xi_start = steady_offset(c, omega(), velocity, -side);
+  const double width = steady_width(c, velocity);
   const Vector2 q_start =
-      Vector2(0.0, side * c.step_width * growth / (growth + 1.0)) - velocity * (period * growth / (growth - 1.0));
+      Vector2(0.0, side * width * growth / (growth + 1.0)) - velocity * (period * growth / (growth - 1.0));
   const double since = std::exp(omega() * (0.5 * c.double_support + time));
   const Vector2 xi = xi_start * since, q = q_start / since;
   problem.com = {0.5 * (xi + q), 0.5 * omega() * (xi - q)};
-  problem.swing_foot = {0.0, side * c.step_width};
+  problem.swing_foot = {0.0, side * width};
   return problem;
 }
 
