@@ -50,6 +50,8 @@ void BipedConfig::validate() const {
   require(walk.recovery_weights.minCoeff() >= 0.0, "walk.recovery_weights' least", walk.recovery_weights.minCoeff(),
           ">= 0");
   require(walk.force_weight > 0.0, "walk.force_weight", walk.force_weight, "> 0");
+  require(walk.recovery_crouch >= 0.0, "walk.recovery_crouch", walk.recovery_crouch, ">= 0 m");
+  require(walk.crouch_rate > 0.0, "walk.crouch_rate", walk.crouch_rate, "> 0 m/s");
   require(stepping.capture.minCoeff() > 0.0, "stepping.capture's least", stepping.capture.minCoeff(), "> 0 m");
   require(stepping.capture_pitch > 0.0, "stepping.capture_pitch", stepping.capture_pitch, "> 0 rad");
   require(stepping.capture_lead >= 0.0, "stepping.capture_lead", stepping.capture_lead, ">= 0 s");
@@ -57,6 +59,7 @@ void BipedConfig::validate() const {
   require(stepping.settled.minCoeff() > 0.0, "stepping.settled's least", stepping.settled.minCoeff(), "> 0 m");
   require(stepping.settled_feet > 0.0, "stepping.settled_feet", stepping.settled_feet, "> 0 m");
   require(stepping.settled_pitch > 0.0, "stepping.settled_pitch", stepping.settled_pitch, "> 0 rad");
+  require(torque_map.max_posture_error > 0.0, "torque_map.max_posture_error", torque_map.max_posture_error, "> 0 rad");
   require(torque_map.swing_kp >= 0.0, "torque_map.swing_kp", torque_map.swing_kp, ">= 0");
   require(torque_map.swing_kd >= 0.0, "torque_map.swing_kd", torque_map.swing_kd, ">= 0");
   require(torque_map.swing_lead >= 0.0 && torque_map.swing_lead < 0.05, "torque_map.swing_lead", torque_map.swing_lead,

@@ -32,6 +32,8 @@ struct WalkConfig {
   CentroidalState state_weights = CentroidalState::Zero();     ///< Q's diagonal, per control period
   CentroidalState recovery_weights = CentroidalState::Zero();  ///< the same while recovering
   double force_weight = 0.0;                                   ///< R's diagonal, per control period
+  double recovery_crouch = 0.0;                                ///< m, by which C is lower while recovering
+  double crouch_rate = 0.0;                                    ///< m/s, at which it gets there and back
 };
 
 /// When a standing robot takes a step, and when a stepping one stands again.
@@ -47,12 +49,13 @@ struct SteppingConfig {
 };
 
 struct TorqueMapConfig {
-  double null_space_kp = 0.0;  ///< 1/s^2
-  double null_space_kd = 0.0;  ///< 1/s
-  double lead = 0.0;           ///< s, from the state to the middle of its command's effect
-  double swing_kp = 0.0;       ///< 1/s^2, of the swing leg's joints
-  double swing_kd = 0.0;       ///< 1/s
-  double swing_lead = 0.0;     ///< s, the same as lead
+  double null_space_kp = 0.0;      ///< 1/s^2
+  double null_space_kd = 0.0;      ///< 1/s
+  double lead = 0.0;               ///< s, from the state to the middle of its command's effect
+  double max_posture_error = 0.0;  ///< rad, of a stance leg's joint, that its gains see
+  double swing_kp = 0.0;           ///< 1/s^2, of the swing leg's joints
+  double swing_kd = 0.0;           ///< 1/s
+  double swing_lead = 0.0;         ///< s, the same as lead
   double max_ankle = 0.0;  ///< m, from the hip's pitch axis to the last link's begin, above which that link stretches
   double max_reach = 0.0;  ///< m, from the hip's pitch axis to the foot, of a swing leg
   double limit_margin = 0.0;  ///< rad, that a swing leg keeps from its joints' limits

@@ -64,6 +64,9 @@ void TorqueMap::stance(const BodyDynamics& body, int leg, const Vector3& force_W
   kinematics::LegVector posture;
   static_cast<void>(
       kinematics::leg_ik(legs_[side], kinematics.foot, pitch_sum(leg, kinematics.foot, trunk_pitch), posture));
+  // A leg bent by its landing goes back to its posture gently: hastily it would tear its foot off the ground.
+  const double error = (posture - q).cwiseAbs().maxCoeff();
+  if (error > config_.max_posture_error) posture = q + config_.max_posture_error / error * (posture - q);
   const kinematics::LegVector n = kinematics::null_direction(kinematics.J_foot);
   const double n_sum = n.tail<3>().sum();
   const double link_rate = qd.tail<3>().sum() + pitch_axis_B(q[0]).dot(w_WB_B);

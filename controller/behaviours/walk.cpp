@@ -61,6 +61,7 @@ int Walk::better_swing(const WalkInput& input, double double_support) const noex
 
 void Walk::enter(const WalkInput& input, int swing, double double_support) noexcept {
   height_.reset();
+  crouch_ = 0.0;
   velocity_.reset(input.rpy.z());
   gait_.start(swing, double_support, gait_input(input));
   qp_->reset();
@@ -85,7 +86,9 @@ void Walk::plan(const WalkInput& input, TickState& out) noexcept {
   }
   middle /= standing;
   ground_z_ = middle.z() - foot_radius_;
-  const double offset = height_.offset(input.height_offset, dt);
+  const double crouch_step = config_.crouch_rate * dt;
+  crouch_ += std::clamp((gait.recovering ? config_.recovery_crouch : 0.0) - crouch_, -crouch_step, crouch_step);
+  const double offset = height_.offset(input.height_offset, dt) - crouch_;
   const Vector2 ahead = planning::in_world(velocity_.yaw(), Vector2::UnitX());
   const auto height_at = [&](const Vector2& p) {
     return ground_z_ + nominal_height_ + offset + gait.slope * ahead.dot(p - middle.head<2>());

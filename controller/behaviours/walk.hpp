@@ -71,6 +71,7 @@ class Walk {
   std::unique_ptr<force_qp::ForceQp> qp_;
 
   double yaw_ = 0.0;
+  double crouch_ = 0.0;    // m
   double ground_z_ = 0.0;  // m, under the standing feet
   ContactVectors p_WG_ = zero_contact_vectors();
 };

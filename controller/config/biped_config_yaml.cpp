@@ -134,6 +134,7 @@ planning::GaitConfig gait(StrictYaml yaml) {
   c.recovery_threshold = yaml.number("recovery_threshold");
   c.freeze = yaml.number("freeze");
   c.touchdown_phase = yaml.number("touchdown_phase");
+  c.touchdown_speed = yaml.number("touchdown_speed");
   c.slope_gain = yaml.number("slope_gain");
   c.slope_min_step = yaml.number("slope_min_step");
   c.max_slope = yaml.number("max_slope");
@@ -177,6 +178,8 @@ behaviours::WalkConfig walk(StrictYaml yaml) {
   c.state_weights = Eigen::Map<const CentroidalState>(weights.data());
   c.recovery_weights = Eigen::Map<const CentroidalState>(recovery.data());
   c.force_weight = yaml.number("force_weight");
+  c.recovery_crouch = yaml.number("recovery_crouch");
+  c.crouch_rate = yaml.number("crouch_rate");
   yaml.finish();
   return c;
 }
@@ -199,6 +202,7 @@ behaviours::TorqueMapConfig torque_map(StrictYaml yaml) {
   c.null_space_kp = yaml.number("null_space_kp");
   c.null_space_kd = yaml.number("null_space_kd");
   c.lead = yaml.number("lead");
+  c.max_posture_error = yaml.number("max_posture_error");
   c.swing_kp = yaml.number("swing_kp");
   c.swing_kd = yaml.number("swing_kd");
   c.swing_lead = yaml.number("swing_lead");

@@ -24,6 +24,7 @@ void GaitConfig::validate() const {
   require(recovery_threshold > 0.0, "recovery_threshold", recovery_threshold, "> 0 m");
   require(freeze >= 0.0, "freeze", freeze, ">= 0 s");
   require(touchdown_phase > 0.0 && touchdown_phase < 1.0, "touchdown_phase", touchdown_phase, "in 0..1");
+  require(touchdown_speed > 0.0, "touchdown_speed", touchdown_speed, "> 0 m/s");
   require(slope_gain >= 0.0 && slope_gain <= 1.0, "slope_gain", slope_gain, "in 0..1");
   require(slope_min_step > 0.0, "slope_min_step", slope_min_step, "> 0 m");
   require(max_slope >= 0.0, "max_slope", max_slope, ">= 0");
@@ -75,9 +76,10 @@ void Gait::step(const GaitInput& input, double dt) noexcept {
       state_.swing_time = state_.next_swing_time;
       swing_.lift_off(input.p_WF[static_cast<std::size_t>(state_.swing)]);
     }
-  } else if (swing_.phase() > config_.touchdown_phase && input.contact_switch[static_cast<std::size_t>(state_.swing)]) {
+  } else if (landed(input, dt)) {
     touch_down(input);
   }
+  p_swing_ = input.p_WF[static_cast<std::size_t>(state_.swing)];
   for (int foot = 0; foot < 2; ++foot) {
     const auto i = static_cast<std::size_t>(foot);
     if (state_.stance(foot)) state_.p_WF[i] = input.p_WF[i];
@@ -89,6 +91,13 @@ void Gait::step(const GaitInput& input, double dt) noexcept {
     state_.foothold_z = support.z() + state_.slope * forward;
     swing_.step(state_.foothold, state_.foothold_z, std::max(0.0, state_.swing_time - state_.time), dt);
   }
+}
+
+bool Gait::landed(const GaitInput& input, double dt) const noexcept {
+  const auto foot = static_cast<std::size_t>(state_.swing);
+  // A foot that scuffs on its way would be kicked off the ground by the forces of a stance.
+  const double speed = (input.p_WF[foot] - p_swing_).head<2>().norm() / dt;
+  return swing_.phase() > config_.touchdown_phase && input.contact_switch[foot] && speed < config_.touchdown_speed;
 }
 
 void Gait::touch_down(const GaitInput& input) noexcept {

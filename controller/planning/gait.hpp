@@ -18,6 +18,7 @@ struct GaitConfig {
   double recovery_threshold = 0.0;       ///< m, of the recovery measure, above which the gait recovers
   double freeze = 0.0;                   ///< s before touchdown, in which time and crossing stand
   double touchdown_phase = 0.0;          ///< of the swing, from which a closed switch is a touchdown
+  double touchdown_speed = 0.0;          ///< m/s over the ground, above which a foot that touches it has not landed
   double slope_gain = 0.0;               ///< of a step's slope, into the estimate
   double slope_min_step = 0.0;           ///< m, of a step that tells a slope
   double max_slope = 0.0;                ///< 1
@@ -76,6 +77,7 @@ class Gait {
   double double_support() const noexcept;  ///< s, of the coming ones
 
  private:
+  bool landed(const GaitInput& input, double dt) const noexcept;
   void touch_down(const GaitInput& input) noexcept;
   void plan(const GaitInput& input) noexcept;
 
@@ -83,6 +85,7 @@ class Gait {
   double omega_, hip_lateral_;
   Swing swing_;
   GaitState state_;
+  Vector3 p_swing_ = Vector3::Zero();  // m, tip of the foot that swings or will next, at the last step
 };
 
 }  // namespace stance::planning

@@ -45,7 +45,7 @@ TEST_CASE("ItWalksAsTheOperatorWantsAndStandsAgain") {
     double vx, vy, yaw_rate;
   };
   for (const Case& c : {Case{0.0, 0.0, 0.0}, Case{0.5, 0.0, 0.0}, Case{1.2, 0.0, 0.0}, Case{-0.4, 0.0, 0.0},
-                        Case{0.0, 0.3, 0.0}, Case{0.0, 0.0, 0.6}}) {
+                        Case{0.0, 0.3, 0.0}, Case{0.0, -0.5, 0.0}, Case{0.0, 0.0, 0.6}}) {
     CAPTURE(c.vx, c.vy, c.yaw_rate);
     BipedRig rig;
     rig.tick_times(kSettled);
@@ -103,6 +103,26 @@ TEST_CASE("APushTooHardToStandIsMetByStepsAndThenItStands") {
     CHECK(rig.trace().behaviour == Behaviour::kStand);
     CHECK(rig.tilt() < 0.05);
   }
+}
+
+TEST_CASE("AHardPushMakesASteppingRobotCrouchAndRiseAgain") {
+  const double crouch = config::biped_config(test::biped()).walk.recovery_crouch;
+  sim::Scenario scenario = quiet_stand();
+  scenario.pushes = {push(3.0, 120.0, 0.0, 0.0)};
+  BipedRig rig(scenario);
+  rig.tick_times(kSettled);
+  rig.give(walk_command(1, 0.0, 0.0, 0.0));
+  rig.tick_times(3 * kSecond - kSettled);
+  const double before = rig.trace().x_ref[5];
+  double lowest = before;
+  for (int k = 0; k < 6 * kSecond; ++k) {
+    if (k % 10 == 0) rig.give(walk_command(2 + k / 10, 0.0, 0.0, 0.0));
+    rig.tick();
+    lowest = std::min(lowest, rig.trace().x_ref[5]);
+  }
+  CHECK_FALSE(rig.simulator.fallen());
+  CHECK(lowest < before - 0.01);
+  CHECK(std::abs(rig.trace().x_ref[5] - before) < 0.1 * crouch);
 }
 
 TEST_CASE("APushWithinTheStancesReachTakesNoStep") {

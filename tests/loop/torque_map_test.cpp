@@ -77,6 +77,19 @@ TEST_CASE("ASwingLegsCommandMovesItsFootAsTheReferenceSaysOnAMovingTrunk") {
   CHECK(((foot_of(then) - foot_of(now)) / step - reference.v).norm() < 5e-3);
 }
 
+TEST_CASE("AStanceLegThatIsFarFromItsPostureIsDrawnBackGently") {
+  BodyDynamics body = moving_body();
+  body.state.v_WB.setZero();
+  body.state.w_WB_W.setZero();
+  // The last link bent by the landing of a foot.
+  const int stance = 4 * (1 - kSwing);
+  body.state.q[stance + 3] += 0.8;
+  rigid_body::forward_kinematics(robot().model, body.state, body.kinematics);
+  const JointCommand command = command_of(body, {});
+  const double error = (command.position - body.state.q).segment<4>(stance).cwiseAbs().maxCoeff();
+  CHECK(std::abs(error - configuration().torque_map.max_posture_error) < 1e-9);
+}
+
 TEST_CASE("ASwingLegThatFallsFreelyWithItsTrunkNeedsNoTorque") {
   const Vector3 gravity(0.0, 0.0, -kGravity);
   BodyDynamics body = moving_body();

@@ -111,6 +111,22 @@ TEST_CASE("ASwitchThatClosesEarlyInTheSwingIsNoTouchdown") {
   CHECK(rig.gait.state().steps == 0);
 }
 
+TEST_CASE("AFootThatScuffsOnItsWayHasNotLandedUntilItIsSlow") {
+  Rig rig;
+  while (rig.gait.state().phase != GaitPhase::kSingleSupport) rig.tick();
+  const GaitConfig& config = rig.gait.config();
+  while (rig.gait.state().time < 0.8 * config.footholds.swing_time) rig.tick();
+  const auto swing = static_cast<std::size_t>(rig.gait.state().swing);
+  rig.input.contact_switch[swing] = true;
+  rig.input.p_WF[swing].x() += 1.1 * config.touchdown_speed * kDt;
+  rig.gait.step(rig.input, kDt);
+  CHECK(rig.gait.state().phase == GaitPhase::kSingleSupport);
+  rig.input.p_WF[swing].x() += 0.9 * config.touchdown_speed * kDt;
+  rig.gait.step(rig.input, kDt);
+  CHECK(rig.gait.state().phase == GaitPhase::kDoubleSupport);
+  CHECK(rig.gait.state().steps == 1);
+}
+
 TEST_CASE("TheLoadLeavesTheFootThatIsAboutToLift") {
   Rig rig;
   double last = 1.0;
