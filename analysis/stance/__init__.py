@@ -6,8 +6,8 @@
     measure(run).trunk.tilt_max_deg
 
 Modules: `log` reads, `series` holds, `metrics` and `check` judge, `plots` and `picture` draw, `report` writes; `study`
-asks, `campaign` runs and counts, `scoreboard` keeps; `run`, `replay`, `command` and `network` speak LCM; `cli` is the
-command `stance`.
+asks, `campaign` runs and counts, `tick_cpu` adds up, `scoreboard` keeps; `run`, `replay`, `command` and `network` speak
+LCM; `cli` is the command `stance`.
 """
 
 from importlib.metadata import version

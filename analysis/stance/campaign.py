@@ -43,6 +43,7 @@ from .log import Log
 from .plain import counted, to_json
 from .programs import find_program, mortal, share_directory
 from .study import Cell, Study
+from .tick_cpu import TickCpu, merge
 
 SCHEMA = {"schema": "stance.campaign", "version": 1}
 ROLLOUT = "stance-rollout"
@@ -137,6 +138,10 @@ class Outcome:
     """hash of stance-rollout and of the robot's files"""
     directory: str
     cells: list[Tally]
+    tick_cpu: TickCpu
+    """of every trial"""
+    qp_iterations_max: int
+    """of any tick"""
 
     @property
     def met(self) -> bool:
@@ -176,10 +181,17 @@ def run_campaign(
             say(line)
         campaign = _Campaign(chosen, request, program, store)
         campaign.run(progress)
-        tallies = campaign.tallies()
-    outcome = Outcome(
-        study.name, study.title, study.robot, request.seed, program.digest, str(program.directory), tallies
-    )
+        outcome = Outcome(
+            study=study.name,
+            title=study.title,
+            robot=study.robot,
+            seed=request.seed,
+            program=program.digest,
+            directory=str(program.directory),
+            cells=campaign.tallies(),
+            tick_cpu=merge(told["tick_cpu"] for told in campaign.rollouts()),
+            qp_iterations_max=max(told["qp_iterations_max"] for told in campaign.rollouts()),
+        )
     (program.directory / "summary.json").write_text(to_json(outcome.as_dict()) + "\n")
     return outcome
 
@@ -203,6 +215,12 @@ def as_text(outcome: Outcome, shown: int = 3) -> str:
             lines.append(f"       seed {failure.seed}: {'; '.join([*failure.why, *drawn])}; again: {failure.command}")
         if len(cell.failures) > shown:
             lines.append(f"       and {len(cell.failures) - shown} more, all in {outcome.directory}/summary.json")
+    cpu = outcome.tick_cpu
+    times = " / ".join(f"{time:,.0f}" for time in (cpu.p50_us, cpu.p99_us, cpu.p99_9_us, cpu.max_us))
+    lines.append(
+        f"     {cpu.ticks:,} ticks: CPU p50 / p99 / p99.9 / max {times} µs; at most "
+        f"{counted(outcome.qp_iterations_max, 'QP iteration')}"
+    )
     return "\n".join(lines)
 
 
@@ -410,11 +428,12 @@ class _Campaign:
                     progress(done, len(trials))
         logs.rmdir()
 
+    def rollouts(self) -> list[dict[str, Any]]:
+        """What stance-rollout told of each trial."""
+        return [trial.rollout for cell in self._cells for trial in self._trials(cell)]
+
     def tallies(self) -> list[Tally]:
-        trials = {
-            cell.name: [self._store.trials[self._keys[cell.name], seed] for seed in self._seeds(cell)]
-            for cell in self._cells
-        }
+        trials = {cell.name: self._trials(cell) for cell in self._cells}
         rates = {
             cell.name: sum(not _why(cell, trial) for trial in trials[cell.name]) / self._count(cell)
             for cell in self._cells
@@ -445,6 +464,9 @@ class _Campaign:
         )
 
     # ---- where things are
+
+    def _trials(self, cell: Cell) -> list[_Trial]:
+        return [self._store.trials[self._keys[cell.name], seed] for seed in self._seeds(cell)]
 
     def _count(self, cell: Cell) -> int:
         return cell.count(self._request.trials)

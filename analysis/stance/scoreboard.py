@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
 from .campaign import Outcome
 from .check import quantity
 from .errors import StanceError
+from .plain import counted
 
 SCHEMA = {"schema": "stance.studies", "version": 1}
 DIGITS = 4  # of what is kept: more would only make noise between two runs
@@ -61,7 +63,7 @@ def _small(outcome: Outcome) -> dict[str, Any]:
     """Without what is this machine's own, and without each failure."""
 
     def rounded(value: float | None) -> float | None:
-        return None if value is None else float(f"{value:.{DIGITS}g}")
+        return float(f"{value:.{DIGITS}g}") if isinstance(value, float) else value
 
     return {
         "study": outcome.study,
@@ -69,6 +71,8 @@ def _small(outcome: Outcome) -> dict[str, Any]:
         "robot": outcome.robot,
         "seed": outcome.seed,
         "program": outcome.program[:12],
+        "tick_cpu": {key: rounded(value) for key, value in asdict(outcome.tick_cpu).items()},
+        "qp_iterations_max": outcome.qp_iterations_max,
         "cells": [
             {
                 "name": cell.name,
@@ -99,7 +103,7 @@ def table(document: dict[str, Any]) -> str:
     """Markdown of what `keep` wrote: a row for each cell."""
     rows = [HEAD, ("---",) * len(HEAD)]
     for study in document["studies"]:
-        rows.append((f"**{study['title']}**", *[""] * (len(HEAD) - 1)))
+        rows.append((f"**{study['title']}**", "", "", "", _ticks(study), ""))
         for cell in study["cells"]:
             low, high = cell["interval"]
             asked = f"{cell['asked']}, {'met' if cell['met'] else 'not met'}" if cell["asked"] else "stated"
@@ -115,6 +119,14 @@ def table(document: dict[str, Any]) -> str:
                 )
             )
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+
+
+def _ticks(study: dict[str, Any]) -> str:
+    """The tick's CPU and the QP's iterations over a study for people; "-" where what is kept is older than they are."""
+    if "tick_cpu" not in study:
+        return "-"
+    times = " / ".join(f"{study['tick_cpu'][key]:,.0f}" for key in ("p50_us", "p99_us", "p99_9_us", "max_us"))
+    return f"ticks: {times} µs, at most {counted(study['qp_iterations_max'], 'QP iteration')}"
 
 
 def _figure(one: dict[str, Any]) -> str:

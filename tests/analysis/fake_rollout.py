@@ -52,6 +52,13 @@ def main() -> int:
         "fallen_on": "shank_l" if fallen else None,
         "friction": robot["controller"]["force_qp"]["friction"],
         "max_tilt_rad": 0.1 * impulse + 0.01 * seed,
+        "qp_iterations_max": 10 * seed,
+        "tick_cpu": {
+            "max_us": 100.0,
+            "first_edge_us": 1,
+            "bins_per_decade": 1,
+            "counts": [0, 59, 1, 0],
+        },
         "command_hash": hashlib.sha256(f"{impulse} {seed} {salt}".encode()).hexdigest(),
     }
     print(json.dumps(told))

@@ -19,6 +19,7 @@ from stance.errors import RunError, StanceError
 from stance.log import Log
 from stance.programs import SOURCE_TREE
 from stance.study import load_study
+from stance.tick_cpu import TickCpu
 
 STUDY = """\
 title: Pushes
@@ -125,7 +126,10 @@ def test_successes_are_counted_and_judged_by_what_is_asked(bench: Bench) -> None
     assert json.loads((Path(outcome.directory) / "summary.json").read_text()) == json.loads(
         json.dumps(outcome.as_dict())
     )
+    assert outcome.qp_iterations_max == 30
+    assert outcome.tick_cpu == TickCpu(540, 100.0, 100.0, 100.0, 100.0)
     text = as_text(outcome, shown=1)
+    assert "540 ticks: CPU p50 / p99 / p99.9 / max 100 / 100 / 100 / 100 µs; at most 30 QP iterations" in text
     assert "ok   10 N       3/3   0.439 to 1.000   asked ≥ 50 %" in text
     assert "FAIL 80 N       0/3   0.000 to 0.561   asked ≥ that of '10 N' less 50 points" in text
     assert "and 2 more" in text

@@ -13,6 +13,7 @@ from stance.errors import StanceError
 from stance.programs import SOURCE_TREE
 from stance.scoreboard import around, insert, keep, load, table
 from stance.study import load_study
+from stance.tick_cpu import TickCpu
 
 KEPT = SOURCE_TREE / "docs/studies.json"
 STUDIES = sorted(path.stem for path in (SOURCE_TREE / "sim/scenarios/biped/studies").glob("*.yaml"))
@@ -41,11 +42,13 @@ OUTCOME = Outcome(
         ),
         Tally("60 N s", 40, 0, 40, (0.0, 0.0876222), "", True, [], []),
     ],
+    tick_cpu=TickCpu(120_000, 79.43282, 398.1072, 794.3282, 1234.567),
+    qp_iterations_max=25,
 )
 TABLE = """\
 |  | succeeded | 95% interval | asked | median, worst (asked) | `stance campaign` with |
 | --- | --- | --- | --- | --- | --- |
-| **Pushed while standing** |  |  |  |  |  |
+| **Pushed while standing** |  |  |  | ticks: 79 / 398 / 794 / 1,235 µs, at most 25 QP iterations |  |
 | 6 N s | 39/40 | 0.87 to 1.00 | ≥ 95 %, met |  | `--study pushes --trials 40 --seed 10000` |
 | 6 N s, noisy | 30/40 | 0.60 to 0.86 | ≥ that of '6 N s' less 5 points, not met | largest tilt 12.2°, 53.4° (≤ 53.1°: 2 not); standing at the end = stand: 1 not | `--study pushes --trials 40 --seed 10000` |
 | 60 N s | 0/40 | 0.00 to 0.09 | stated |  | `--study pushes --trials 40 --seed 10000` |"""  # noqa: E501
@@ -53,6 +56,12 @@ TABLE = """\
 
 def test_the_table_has_a_row_for_each_cell_with_its_command(tmp_path: Path) -> None:
     assert table(keep(tmp_path / "kept.json", [OUTCOME])) == TABLE
+
+
+def test_what_was_kept_before_ticks_were_counted_has_none(tmp_path: Path) -> None:
+    document = keep(tmp_path / "kept.json", [OUTCOME])
+    del document["studies"][0]["tick_cpu"], document["studies"][0]["qp_iterations_max"]
+    assert table(document).splitlines()[2] == "| **Pushed while standing** |  |  |  | - |  |"
 
 
 def test_a_study_takes_the_place_of_its_earlier_self(tmp_path: Path) -> None:
@@ -69,7 +78,9 @@ def test_what_is_kept_is_small_and_names_no_place(tmp_path: Path) -> None:
     path = tmp_path / "kept.json"
     keep(path, [OUTCOME])
     assert "somewhere" not in path.read_text()
-    assert json.loads(path.read_text())["studies"][0]["cells"][1]["figures"][0]["median"] == 0.2123
+    (study,) = json.loads(path.read_text())["studies"]
+    assert study["cells"][1]["figures"][0]["median"] == 0.2123
+    assert study["tick_cpu"] == {"ticks": 120_000, "p50_us": 79.43, "p99_us": 398.1, "p99_9_us": 794.3, "max_us": 1235}
 
 
 @pytest.mark.parametrize(
