@@ -18,6 +18,7 @@ from __future__ import annotations
 
 import fcntl
 import hashlib
+import inspect
 import json
 import os
 import re
@@ -36,7 +37,7 @@ from pathlib import Path
 from statistics import median
 from typing import IO, Any
 
-from . import metrics
+from . import configuration, estimation, metrics, signals
 from .check import Finding, Limit, figure, judge, quantity
 from .errors import RunError, StanceError
 from .log import Log
@@ -50,6 +51,7 @@ ROLLOUT = "stance-rollout"
 FELL = 1  # its exit code for a robot that fell
 CONFIDENCE = 0.95
 TOLERANCE = 1e-12  # of a rate, which is a quotient of whole numbers
+MEASURING = (configuration, estimation, metrics, signals)  # what a figure of a log depends on
 
 Progress = Callable[[int, int], None]
 """called with the trials done and in all"""
@@ -305,7 +307,7 @@ class _Trial:
 def _key(cell: Cell) -> str:
     """A hash of all that a trial's record depends on besides program, robot and seed."""
     paths = sorted(_paths(cell.log_limits))
-    measured = [*paths, Path(metrics.__file__).read_text()] if paths else []
+    measured = [*paths, *map(inspect.getsource, MEASURING)] if paths else []
     return hashlib.sha256(
         "\0".join([cell.name, cell.scenario, cell.configuration or "", *measured]).encode()
     ).hexdigest()[:16]

@@ -10,18 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import configuration
+from . import configuration, signals
+from .estimation import EstimatorError, estimator_error
 from .messages import CHANNELS
-from .series import Array, Floats, Integers, Run, match, missing_after, restarted
-from .urdf import rotation_from_quaternion
+from .series import Array, Floats, Integers, Run, missing_after, restarted
+from .signals import Percentiles
 
 if TYPE_CHECKING:
     from .log import LogReport
 
-MIN_NORMAL_FORCE = 5.0  # N, below it a contact's friction ratio says nothing
 PUSH_THRESHOLD = 1e-9  # N, of a push that counts as one
-MIN_PATH = 1.0  # m, below it drift is no share of the path
-PATH_STEP = 1.0  # s between the points that measure a path, so that sway is none of it
 SLIP_WINDOW = 0.5  # s at the run's end: the least late of its states shows what real time has lost
 
 STAGES = ("decode", "validate", "estimate", "plan", "model", "force_qp", "torque", "safety", "encode")
@@ -40,26 +38,6 @@ QP_STATUS = ("not_run", "solved", "max_iterations", "infeasible", "invalid_probl
 QP_NOT_RUN, QP_SOLVED = 0, 1
 BEHAVIOURS = ("stand", "walk", "lie_down", "track", "catch")
 REFUSALS = ("refused_stale", "refused_not_finite", "refused_order", "refused_run")
-
-
-@dataclass(frozen=True)
-class Percentiles:
-    """Of one quantity over a run, in the unit that its name says: values that did occur, never between two."""
-
-    p50: float
-    p99: float
-    p99_9: float
-    max: float
-
-    @classmethod
-    def of(cls, values: Array) -> Percentiles | None:
-        """None where there are no finite values."""
-        finite = np.asarray(values, float)
-        finite = finite[np.isfinite(finite)]
-        if not len(finite):
-            return None
-        p50, p99, p99_9 = (float(value) for value in np.percentile(finite, [50.0, 99.0, 99.9], method="higher"))
-        return cls(p50, p99, p99_9, float(finite.max()))
 
 
 @dataclass(frozen=True)
@@ -180,34 +158,6 @@ class Joints:
 
 
 @dataclass(frozen=True)
-class EstimatorError:
-    """Of the controller's estimate of its base against the truth of the same instant."""
-
-    position_rms: float
-    """m"""
-    position_max: float
-    position_drift: float
-    """m, change of the error from the run's start to its end"""
-    velocity_rms: float
-    """m/s"""
-    tilt_max_deg: float
-    yaw_max_deg: float
-    roll_rms: float
-    """rad"""
-    pitch_rms: float
-    """rad"""
-    heading_velocity_rms: float
-    """m/s, of the worst axis: estimate and truth each in their own heading frame, since yaw is not observed"""
-    height_rms: float | None
-    """m, of B over the feet that bear load"""
-    odometry_share: float | None
-    """drift of the horizontal position over the length of the path; None for a path shorter than 1 m"""
-    nees: float | None
-    """normalised error squared per degree of freedom, of roll, pitch and the heading frame's velocity: 1 where the
-    stated sigma are right; None where one is 0"""
-
-
-@dataclass(frozen=True)
 class Push:
     start: float
     """s"""
@@ -311,42 +261,13 @@ def measure(run: Run, report: LogReport | None = None) -> Metrics:
         pushes=pushes(run),
         refused=refused,
         refused_total=sum(refused.values()),
-        drives_damped=None if damped is None else float((damped != 0).sum() * period(run)),
+        drives_damped=None if damped is None else float((damped != 0).sum() * signals.period(run)),
         drives_damped_share=None if damped is None else float((damped != 0).mean()),
         faults=faults(run),
         safety=safety(run),
         channels=channels(run),
         log=None if report is None else log_quality(run, report),
     )
-
-
-def period(run: Run) -> float:
-    """s, the control period: the samples of one ROBOT_STATE together."""
-    samples = run.field("ROBOT_STATE", "sample_period")
-    count = run.field("ROBOT_STATE", "gyro").shape[1]
-    nominal = float(np.median(samples)) * count if len(samples) else 0.0
-    if nominal > 0.0:
-        return nominal
-    steps = np.diff(run.field("ROBOT_STATE", "utime"))
-    return float(np.median(steps)) * 1e-6 if len(steps) else 0.01
-
-
-def z_axis(quat_WB: Array) -> Floats:
-    """B's z axis in W: (..., 4) → (..., 3)."""
-    return rotation_from_quaternion(quat_WB)[..., 2]
-
-
-def tilt(quat_WB: Array) -> Floats:
-    """rad, angle of B's z axis from W's: (..., 4) → (...)."""
-    z = z_axis(quat_WB)
-    return np.asarray(np.arctan2(np.hypot(z[..., 0], z[..., 1]), z[..., 2]))
-
-
-def roll_pitch_yaw(quat_WB: Array) -> Floats:
-    """rad, of R = Rz(yaw) Ry(pitch) Rx(roll): (..., 4) → (..., 3)."""
-    R = rotation_from_quaternion(quat_WB)
-    roll, yaw = np.arctan2(R[..., 2, 1], R[..., 2, 2]), np.arctan2(R[..., 1, 0], R[..., 0, 0])
-    return np.stack([roll, np.arcsin(np.clip(-R[..., 2, 0], -1.0, 1.0)), yaw], axis=-1)
 
 
 def fall(run: Run) -> float | None:
@@ -374,9 +295,9 @@ def trunk(run: Run) -> Trunk | None:
     channel = "TRUTH" if "TRUTH" in run else "CONTROLLER_TRACE"
     if channel not in run:
         return None
-    angle = np.degrees(tilt(run.field(channel, "quat_WB")))
+    angle = np.degrees(signals.tilt(run.field(channel, "quat_WB")))
     height = run.field(channel, "p_WB")[:, 2]
-    return Trunk(float(angle.max()), _rms(angle), float(height.min()))
+    return Trunk(float(angle.max()), signals.rms(angle), float(height.min()))
 
 
 def center_of_mass_error(run: Run) -> tuple[Floats, Floats] | None:
@@ -387,15 +308,8 @@ def center_of_mass_error(run: Run) -> tuple[Floats, Floats] | None:
     time = run.time("CONTROLLER_TRACE")
     if "TRUTH" not in run:
         return time, run.field("CONTROLLER_TRACE", "x")[:, 3:6] - reference
-    rows, truth_rows = truth_of_ticks(run)
+    rows, truth_rows = signals.truth_of_ticks(run)
     return time[rows], run.field("TRUTH", "p_WC")[truth_rows] - reference[rows]
-
-
-def truth_of_ticks(run: Run) -> tuple[Integers, Integers]:
-    """Rows of CONTROLLER_TRACE that took a new state, and the rows of TRUTH of the same instants."""
-    found = match(run.field("CONTROLLER_TRACE", "state_seq"), run.field("TRUTH", "seq"))
-    rows = np.flatnonzero((found >= 0) & (run.field("CONTROLLER_TRACE", "state_is_new") != 0))
-    return rows, found[rows]
 
 
 def center_of_mass(run: Run) -> CenterOfMass | None:
@@ -403,7 +317,7 @@ def center_of_mass(run: Run) -> CenterOfMass | None:
     if found is None or not len(found[1]):
         return None
     distance = np.linalg.norm(found[1], axis=1)
-    return CenterOfMass(float(distance.max()), _rms(distance), float(distance[-1]))
+    return CenterOfMass(float(distance.max()), signals.rms(distance), float(distance[-1]))
 
 
 def risen(run: Run, counter: str) -> Integers:
@@ -438,7 +352,7 @@ def ticks(run: Run) -> Ticks | None:
     time = run.time("CONTROLLER_TIMING")
     late = run.field("CONTROLLER_TIMING", "wake_latency_us")
     took = run.field("CONTROLLER_TIMING", "tick_us")
-    budget = 1e6 * period(run)
+    budget = 1e6 * signals.period(run)
     misses = []
     for row in np.flatnonzero(missed).tolist():
         before = float(took[row - 1]) if row else 0.0
@@ -469,7 +383,7 @@ def ticks(run: Run) -> Ticks | None:
 def timing(run: Run) -> Timing | None:
     if "CONTROLLER_TIMING" not in run:
         return None
-    nominal = 1e6 * period(run)
+    nominal = 1e6 * signals.period(run)
     stages = run.field("CONTROLLER_TIMING", "stage_us")
     tick = run.field("CONTROLLER_TIMING", "tick_us")
     lockstep = is_lockstep(run)
@@ -512,22 +426,9 @@ def force_qp(run: Run) -> ForceQp | None:
     )
 
 
-def num_contacts(run: Run) -> int:
-    """Contacts in use: feet."""
-    for channel in ("ROBOT_STATE", "TRUTH", "FORCE_PLAN"):
-        if channel in run:
-            return int(run.field(channel, "num_contacts").max())
-    return 0
-
-
-def num_joints(run: Run) -> int:
-    """Joints in use."""
-    return int(run.field("ROBOT_STATE", "num_joints").max()) if "ROBOT_STATE" in run else 0
-
-
 def planned_forces(run: Run) -> tuple[Floats, Array]:
     """Stage 0 of every plan: (force [N] (n, contacts, 3) in W, contact (n, contacts) bool). nan without a plan."""
-    used = num_contacts(run)
+    used = signals.num_contacts(run)
     planned = (run.field("FORCE_PLAN", "num_stages") > 0)[:, None]
     force = np.where(planned[..., None], run.field("FORCE_PLAN", "force")[:, 0, :used], np.nan)
     return force, planned & (run.field("FORCE_PLAN", "contact")[:, 0, :used] != 0)
@@ -553,7 +454,7 @@ def cone_share(run: Run, channel: str, force: Array, mu: float | None) -> Floats
 
 def _loaded(force: Array) -> Floats:
     """N, normal components of forces (..., 3) → (...); nan where they are too small to divide by."""
-    return np.asarray(np.where(force[..., 2] > MIN_NORMAL_FORCE, force[..., 2], np.nan))
+    return np.asarray(np.where(force[..., 2] > signals.MIN_NORMAL_FORCE, force[..., 2], np.nan))
 
 
 def friction_ratio(force: Array) -> Floats:
@@ -566,9 +467,9 @@ def friction(run: Run) -> Friction:
     share = ratio = None
     if "FORCE_PLAN" in run and mu:
         force, contact = planned_forces(run)
-        share = largest(np.where(contact, cone_share(run, "FORCE_PLAN", force, mu), np.nan))
+        share = signals.largest(np.where(contact, cone_share(run, "FORCE_PLAN", force, mu), np.nan))
     if "TRUTH" in run:
-        ratio = largest(friction_ratio(run.field("TRUTH", "f_F_W")[:, : num_contacts(run)]))
+        ratio = signals.largest(friction_ratio(run.field("TRUTH", "f_F_W")[:, : signals.num_contacts(run)]))
     return Friction(mu, share, ratio)
 
 
@@ -576,8 +477,8 @@ def force_error(run: Run) -> ForceError | None:
     if "TRUTH" not in run:
         return None
     compared = run.field("TRUTH", "plan_seq") > 0
-    error = np.linalg.norm(run.field("TRUTH", "force_error")[compared, : num_contacts(run)], axis=-1)
-    return ForceError(_rms(error), float(error.max())) if error.size else None
+    error = np.linalg.norm(run.field("TRUTH", "force_error")[compared, : signals.num_contacts(run)], axis=-1)
+    return ForceError(signals.rms(error), float(error.max())) if error.size else None
 
 
 def joint_shares(run: Run) -> tuple[Floats, dict[str, Floats], tuple[str, ...]] | None:
@@ -586,7 +487,7 @@ def joint_shares(run: Run) -> tuple[Floats, dict[str, Floats], tuple[str, ...]] 
     By the truth where it is logged, else by the robot's own sensors. None where the log has no URDF.
     """
     body = configuration.robot(run)
-    used = num_joints(run)
+    used = signals.num_joints(run)
     if body is None or not used:
         return None
     limits = body.moving[:used]
@@ -619,75 +520,11 @@ def joints(run: Run) -> Joints | None:
         return None
     _, shares, names = found
     each = [
-        JointUse(name, *(largest(shares[quantity][:, i]) for quantity in ("torque", "speed", "position")))
+        JointUse(name, *(signals.largest(shares[quantity][:, i]) for quantity in ("torque", "speed", "position")))
         for i, name in enumerate(names)
     ]
-    worst = [largest(shares[quantity]) for quantity in ("torque", "speed", "position")]
+    worst = [signals.largest(shares[quantity]) for quantity in ("torque", "speed", "position")]
     return Joints(worst[0], worst[1], worst[2], each)
-
-
-def estimator_error(run: Run) -> EstimatorError | None:
-    if "TRUTH" not in run or "CONTROLLER_TRACE" not in run:
-        return None
-    rows, truth_rows = truth_of_ticks(run)
-    if not len(rows):
-        return None
-
-    def both(name: str) -> tuple[Array, Array]:
-        return run.field("CONTROLLER_TRACE", name)[rows], run.field("TRUTH", name)[truth_rows]
-
-    estimate, truth = both("p_WB")
-    error = estimate - truth
-    distance = np.linalg.norm(error, axis=1)
-    v_estimate, v_truth = both("v_WB")
-    q_estimate, q_truth = both("quat_WB")
-    turn_estimate, turn_truth = roll_pitch_yaw(q_estimate), roll_pitch_yaw(q_truth)
-    turned = np.angle(np.exp(1j * (turn_estimate - turn_truth)))
-    v_error = _in_heading(v_estimate, turn_estimate[:, 2]) - _in_heading(v_truth, turn_truth[:, 2])
-    sigma_v, sigma_theta = (run.field("CONTROLLER_TRACE", name)[rows] for name in ("sigma_v", "sigma_theta"))
-    sigma = np.column_stack([sigma_theta[:, :2], sigma_v])
-    normalised = np.column_stack([turned[:, :2], v_error]) / np.where(sigma > 0.0, sigma, np.nan)
-    path = _path_length(truth, run.time("TRUTH")[truth_rows])
-    return EstimatorError(
-        position_rms=_rms(distance),
-        position_max=float(distance.max()),
-        position_drift=float(np.linalg.norm(error[-1] - error[0])),
-        velocity_rms=_rms(np.linalg.norm(v_estimate - v_truth, axis=1)),
-        tilt_max_deg=float(np.degrees(np.abs(_tilt_between(q_estimate, q_truth)).max())),
-        yaw_max_deg=float(np.degrees(np.abs(turned[:, 2])).max()),
-        roll_rms=_rms(turned[:, 0]),
-        pitch_rms=_rms(turned[:, 1]),
-        heading_velocity_rms=max(_rms(v_error[:, axis]) for axis in range(3)),
-        height_rms=_height_rms(run, rows, truth_rows),
-        odometry_share=float(np.linalg.norm((error[-1] - error[0])[:2])) / path if path >= MIN_PATH else None,
-        nees=None if np.isnan(normalised).any() else float(np.mean(np.square(normalised))),
-    )
-
-
-def _in_heading(vectors: Array, yaw: Array) -> Floats:
-    """Vectors (n, 3) of W in the frame that is turned by `yaw` [rad] (n,) about W's z."""
-    cos, sin = np.cos(yaw), np.sin(yaw)
-    x, y, z = vectors.T
-    return np.column_stack([cos * x + sin * y, cos * y - sin * x, z])
-
-
-def _path_length(position: Array, time: Array) -> float:
-    """m, horizontal, of positions (n, 3) at times [s] (n,)."""
-    rows = np.searchsorted(time, np.arange(time[0], time[-1], PATH_STEP))
-    points = position[np.append(rows, len(time) - 1), :2]
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
-
-
-def _height_rms(run: Run, rows: Integers, truth_rows: Integers) -> float | None:
-    """m, error of B's height over the feet that bear load; None where none ever does."""
-    feet = slice(num_contacts(run))
-    loaded = run.field("TRUTH", "f_F_W")[truth_rows][:, feet, 2] > MIN_NORMAL_FORCE
-
-    def height(channel: str, at: Integers) -> Floats:
-        return np.asarray(run.field(channel, "p_WB")[at][:, None, 2] - run.field(channel, "p_WF")[at][:, feet, 2])
-
-    error = height("CONTROLLER_TRACE", rows) - height("TRUTH", truth_rows)
-    return _rms(error[loaded]) if loaded.any() else None
 
 
 def pushes(run: Run) -> list[Push]:
@@ -696,9 +533,9 @@ def pushes(run: Run) -> list[Push]:
         return []
     force = run.field("TRUTH", "push_W")
     time = run.time("TRUTH")
-    step = period(run)
+    step = signals.period(run)
     found = []
-    for first, last in intervals(np.linalg.norm(force, axis=1) > PUSH_THRESHOLD):
+    for first, last in signals.intervals(np.linalg.norm(force, axis=1) > PUSH_THRESHOLD):
         part = force[first : last + 1]
         impulse = part.sum(axis=0) * step
         found.append(
@@ -758,29 +595,6 @@ def log_quality(run: Run, report: LogReport) -> LogQuality:
     problems = report.problems()
     missing = sum(use.missing for use in channels(run))
     return LogQuality(not problems, missing, report.skipped_bytes, problems)
-
-
-def intervals(active: Array) -> list[tuple[int, int]]:
-    """First and last row of each stretch of true values, (n,) bool."""
-    edges = np.diff(np.concatenate([[0], np.asarray(active, np.int8), [0]]))
-    firsts, ends = np.flatnonzero(edges == 1), np.flatnonzero(edges == -1)
-    return [(int(first), int(end) - 1) for first, end in zip(firsts, ends, strict=True)]
-
-
-def _tilt_between(first: Array, second: Array) -> Floats:
-    """rad, between the z axes of two series of quaternions (n, 4)."""
-    a, b = z_axis(first), z_axis(second)
-    return np.asarray(np.arctan2(np.linalg.norm(np.cross(a, b), axis=-1), (a * b).sum(axis=-1)))
-
-
-def _rms(values: Array) -> float:
-    return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else 0.0
-
-
-def largest(values: Array) -> float | None:
-    """Of those that are numbers; None where none is."""
-    finite = values[~np.isnan(values)]
-    return float(finite.max()) if finite.size else None
 
 
 def _name(names: tuple[str, ...], value: int) -> str:

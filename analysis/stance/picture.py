@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle, FancyArrowPatch, Polygon
 from scipy.spatial import ConvexHull
 
-from . import configuration, metrics, style
+from . import configuration, metrics, signals, style
 from .errors import UnreadableError
 from .metrics import Push
 from .series import Array, Floats, Integers, Run
@@ -76,7 +76,7 @@ def pose_at(run: Run, time: float) -> Pose:
     if not len(rows):
         raise UnreadableError("no TRUTH in the log: the robot cannot be drawn")
     row = int(rows[np.argmin(np.abs(run.time("TRUTH")[rows] - time))])
-    contacts, joints = metrics.num_contacts(run), metrics.num_joints(run)
+    contacts, joints = signals.num_contacts(run), signals.num_joints(run)
 
     def at(name: str) -> Array:
         return np.asarray(run.field("TRUTH", name)[row])
@@ -89,7 +89,7 @@ def pose_at(run: Run, time: float) -> Pose:
         p_WF=at("p_WF")[:contacts],
         f_F_W=at("f_F_W")[:contacts],
         push_W=at("push_W"),
-        tilt=float(metrics.tilt(quaternion)),
+        tilt=float(signals.tilt(quaternion)),
     )
 
 
@@ -167,7 +167,7 @@ def _instants_of(run: Run, push: Push) -> list[float]:
     after = rows[(time[rows] >= end + MIN_STEP) & (time[rows] <= end + 1.0)]
     wanted = [push.start - 0.02, push.start + 0.5 * push.duration, end]
     if len(after):
-        tilt = metrics.tilt(run.field("TRUTH", "quat_WB")[after])
+        tilt = signals.tilt(run.field("TRUTH", "quat_WB")[after])
         peak = float(time[after[np.argmax(tilt)]])
         wanted += [peak, min(peak + 1.0, float(time[rows[-1]]))]
     return [one for before, one in zip([-np.inf, *wanted], wanted, strict=False) if one > before]
@@ -212,7 +212,7 @@ def draw(
     for foot, (tip, force) in enumerate(zip(pose.p_WF, pose.f_F_W, strict=True)):
         ground = np.array([tip @ plane[0], 0.0])
         arrow = force @ plane.T * FORCE_SCALE
-        if mu and force[2] > metrics.MIN_NORMAL_FORCE:
+        if mu and force[2] > signals.MIN_NORMAL_FORCE:
             edge = np.array([mu * CONE_HEIGHT, CONE_HEIGHT])
             cone = [ground, ground + edge * [-1.0, 1.0], ground + edge]
             ax.add_patch(Polygon(cone, closed=True, fc=style.FEET[foot % len(style.FEET)], alpha=0.10, lw=0, zorder=3))

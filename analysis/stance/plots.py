@@ -11,12 +11,13 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 
-from . import configuration, metrics, style
+from . import configuration, metrics, signals, style
 from .check import Verdict
-from .metrics import Metrics, Percentiles
+from .metrics import Metrics
 from .picture import drawable, picture
 from .plain import counted
 from .series import Array, Floats, Run
+from .signals import Percentiles
 from .style import new_figure, shade, styled, time_axis
 
 WIDTH = 11.0  # inch
@@ -125,7 +126,7 @@ def timing(run: Run) -> Figure:
     stage = run.field("CONTROLLER_TIMING", "stage_us")
     tick = run.field("CONTROLLER_TIMING", "tick_us")
     stage = np.column_stack([stage, np.maximum(tick - stage.sum(axis=1), 0.0)])
-    deadline = 1e6 * metrics.period(run)
+    deadline = 1e6 * signals.period(run)
     axes = fig.subplot_mosaic(
         [["period", "period"], ["stages", "stages"], ["histogram", "tail"], ["bars", "tail"]],
         height_ratios=[1.0, 1.25, 1.1, 1.5],
@@ -291,7 +292,7 @@ def center_of_mass(run: Run) -> Figure:
     for row, angle in enumerate(("roll", "pitch", "yaw")):
         ax = axes[row, 1]
         if truth_time is not None:
-            true = np.degrees(metrics.roll_pitch_yaw(run.field("TRUTH", "quat_WB"))[:, row])
+            true = np.degrees(signals.roll_pitch_yaw(run.field("TRUTH", "quat_WB"))[:, row])
             ax.plot(truth_time, true, color=style.TRUTH, lw=1.8)
         ax.plot(time, np.degrees(x[:, row]), color=style.ESTIMATE, lw=0.9)
         ax.plot(time, np.degrees(reference[:, row]), color=style.REFERENCE, lw=1.0, ls=(0, (5, 2)))
@@ -317,7 +318,7 @@ def _at_least(ax: Axes, span: float) -> None:
 def forces(run: Run) -> Figure:
     """4: forces of the ground on each foot, planned and true, their share of the friction cone, and the effort."""
     fig = new_figure(WIDTH, 8.6, "Ground reaction forces", configuration.title(run))
-    used = metrics.num_contacts(run)
+    used = signals.num_contacts(run)
     halves = [slice(0, (used + 1) // 2), slice((used + 1) // 2, used)] if used > 1 else [slice(0, 1)] * 2
     rows = 5 if used > 1 else 6
     grid = fig.add_gridspec(rows, used)
@@ -383,7 +384,7 @@ def _effort_and_error(axes: list[Axes], run: Run, used: int) -> None:
 @styled
 def gait(run: Run) -> Figure:
     """5: which foot stands when: planned, believed, felt by the switch, and true; and how the load is shared."""
-    used = metrics.num_contacts(run)
+    used = signals.num_contacts(run)
     names = configuration.foot_names(run, used)
     kinds = [kind for kind in _contact_kinds(run, used) if kind is not None]
     fig = new_figure(
@@ -399,7 +400,7 @@ def gait(run: Run) -> Figure:
         for name, time, contact, alpha in kinds:
             spans = [
                 (float(time[first]), float(time[min(last + 1, len(time) - 1)] - time[first]))
-                for first, last in metrics.intervals(contact[:, foot])
+                for first, last in signals.intervals(contact[:, foot])
             ]
             top.broken_barh(spans, (y - 0.38, 0.76), facecolor=style.FEET[foot], alpha=alpha, lw=0)
             ticks.append(y)
@@ -454,7 +455,7 @@ def joints(run: Run) -> Figure:
                 values = shares[quantity][:, joint]
                 ax.plot(time, values, color=style.JOINTS[place % 8], lw=1.0, label=names[joint])
             ax.axhline(1.0, color=style.BAD, lw=0.9)
-            largest = metrics.largest(shares[quantity])
+            largest = signals.largest(shares[quantity])
             ax.set_ylim(0.0, max(1.18, 1.05 * min(largest or 0.0, 3.0)))
             if largest is not None and largest < 0.3:
                 ax.set_ylim(0.0, max(1.25 * largest, 0.02))
@@ -553,9 +554,9 @@ PLOTS = {
     "forces": Plot(
         "Ground reaction forces",
         forces,
-        lambda run: metrics.num_contacts(run) > 0 and ("FORCE_PLAN" in run or "TRUTH" in run),
+        lambda run: signals.num_contacts(run) > 0 and ("FORCE_PLAN" in run or "TRUTH" in run),
     ),
-    "gait": Plot("Contacts", gait, lambda run: metrics.num_contacts(run) > 0),
+    "gait": Plot("Contacts", gait, lambda run: signals.num_contacts(run) > 0),
     "joints": Plot("Joints", joints, lambda run: metrics.joint_shares(run) is not None),
     "force_qp": Plot("Force QP", force_qp, lambda run: "CONTROLLER_TRACE" in run),
 }

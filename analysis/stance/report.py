@@ -12,14 +12,15 @@ from typing import Any
 import jinja2
 from matplotlib.figure import Figure
 
-from . import __version__, configuration, plots, style
+from . import __version__, configuration, plots, signals, style
 from .check import SHARE, Verdict, judge, limits_file, load_limits, quantity
 from .errors import StanceError
 from .log import Log
 from .messages import CONTROLLER_CHANNELS
-from .metrics import Metrics, Percentiles, Ticks, measure, period
+from .metrics import Metrics, Ticks, measure
 from .plain import to_json
 from .series import Run
+from .signals import Percentiles
 from .timeline import Event, timeline
 
 SCHEMA = {"schema": "stance.summary", "version": 1}
@@ -71,7 +72,7 @@ def analyse(log: Log, run_id: int | None = None, limits: Path | None = None) -> 
     """
     run = log.run(run_id)
     # What the controller does once the robot has fallen silent for good is no part of the run; the truth ends later.
-    run = run.between(None, run.span[1] + 0.5 * period(run), CONTROLLER_CHANNELS)
+    run = run.between(None, run.span[1] + 0.5 * signals.period(run), CONTROLLER_CHANNELS)
     measured = measure(run, log.report)
     info = run.controller or run.simulator
     chosen = limits or limits_file(info.robot if info else "", configuration.scenario_name(run))

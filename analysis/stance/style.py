@@ -13,7 +13,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from . import metrics
+from . import metrics, signals
 from .series import Run
 
 P = ParamSpec("P")
@@ -180,5 +180,5 @@ def time_axis(axes: Sequence[Axes], run: Run) -> None:
     for ax in axes[:-1]:
         ax.tick_params(labelbottom=False)
     for ax in axes:
-        ax.set_xlim(first, last + metrics.period(run))
+        ax.set_xlim(first, last + signals.period(run))
     axes[-1].set_xlabel("time [s]")

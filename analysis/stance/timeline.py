@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import metrics
+from . import metrics, signals
 from .plain import counted
 from .series import Run, missing_after, restarted
 
@@ -81,7 +81,7 @@ def _faults(run: Run) -> list[Event]:
     for place, name in enumerate(metrics.FAULTS):
         stood = (bits >> place) & 1 != 0
         merged: list[tuple[int, int]] = []
-        for first, last in metrics.intervals(stood):
+        for first, last in signals.intervals(stood):
             if merged and time[first] - time[merged[-1][1]] <= MERGE:
                 merged[-1] = (merged[-1][0], last)
             else:
@@ -117,7 +117,7 @@ def _damped(run: Run) -> list[Event]:
     if "TRUTH" not in run:
         return []
     time = run.time("TRUTH")
-    spans = metrics.intervals(run.field("TRUTH", "drives_damped") != 0)
+    spans = signals.intervals(run.field("TRUTH", "drives_damped") != 0)
     return [
         Event(float(time[first]), "damped", f"the drives damp for {time[last] - time[first]:.2f} s", bad=first > 0)
         for first, last in spans

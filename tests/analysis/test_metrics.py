@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from stance import metrics
+from stance import metrics, signals
+from stance.estimation import estimator_error
 from stance.log import Log
 from stance.messages import message_type
-from stance.metrics import Percentiles, measure
+from stance.metrics import measure
+from stance.signals import Percentiles
 from synthetic import PERIOD, WALL, Synthetic, encode_log, run_of, ticked
 
 N = 101
@@ -69,7 +71,7 @@ def test_tilt_does_not_see_yaw() -> None:
     run = run_of(base(TRUTH=messages))
     found = metrics.trunk(run)
     assert found is not None and found.tilt_max_deg == pytest.approx(0.0, abs=1e-9)
-    assert metrics.roll_pitch_yaw(run.field("TRUTH", "quat_WB"))[0] == pytest.approx([0.0, 0.0, 1.4])
+    assert signals.roll_pitch_yaw(run.field("TRUTH", "quat_WB"))[0] == pytest.approx([0.0, 0.0, 1.4])
 
 
 def test_an_orientation_that_is_none_is_told_and_breaks_nothing() -> None:
@@ -77,7 +79,7 @@ def test_an_orientation_that_is_none_is_told_and_breaks_nothing() -> None:
     messages["quat_WB"][30], messages["quat_WB"][40] = np.nan, 0.0
     found = metrics.trunk(run_of(base(TRUTH=messages)))
     assert found is not None and np.isnan(found.tilt_max_deg)
-    assert np.isnan(metrics.tilt(messages["quat_WB"])).nonzero()[0].tolist() == [30, 40]
+    assert np.isnan(signals.tilt(messages["quat_WB"])).nonzero()[0].tolist() == [30, 40]
 
 
 def test_a_fall_is_when_the_truth_says_so() -> None:
@@ -285,7 +287,7 @@ def test_the_estimators_error_is_taken_at_the_same_instant() -> None:
     estimate["quat_WB"][30] = np.cos(angle / 2), np.sin(angle / 2), 0.0, 0.0
     estimate["quat_WB"][31] = np.cos(angle), 0.0, 0.0, np.sin(angle)
     estimate["state_is_new"][90], estimate["p_WB"][90] = 0, 99.0  # no new state: says nothing of the estimate
-    found = metrics.estimator_error(run_of(base(TRUTH=messages, CONTROLLER_TRACE=estimate)))
+    found = estimator_error(run_of(base(TRUTH=messages, CONTROLLER_TRACE=estimate)))
     assert found is not None
     assert found.position_max == pytest.approx(0.005)
     assert found.position_drift == pytest.approx(0.004)
@@ -305,7 +307,7 @@ def test_the_estimators_errors_are_those_of_a_robot_that_does_not_know_its_yaw()
     messages["p_WF"][:, :, 2], estimate["p_WF"][:, :, 2] = 0.02, 0.021
     estimate["p_WF"][50:, 0, 2] = 9.0  # in swing
     estimate["sigma_v"], estimate["sigma_theta"] = 0.01, 0.001
-    found = metrics.estimator_error(run_of(base(TRUTH=messages, CONTROLLER_TRACE=estimate)))
+    found = estimator_error(run_of(base(TRUTH=messages, CONTROLLER_TRACE=estimate)))
     assert found is not None
     assert found.yaw_max_deg == pytest.approx(90.0)
     assert (found.roll_rms, found.pitch_rms) == pytest.approx((0.0, 0.0), abs=1e-12)
@@ -319,7 +321,7 @@ def test_the_estimators_errors_are_those_of_a_robot_that_does_not_know_its_yaw()
 def test_roll_and_pitch_are_told_apart(axis: int) -> None:
     messages, estimate = truth(), trace()
     estimate["quat_WB"][:, 0], estimate["quat_WB"][:, 1 + axis] = np.cos(0.005), np.sin(0.005)
-    found = metrics.estimator_error(run_of(base(TRUTH=messages, CONTROLLER_TRACE=estimate)))
+    found = estimator_error(run_of(base(TRUTH=messages, CONTROLLER_TRACE=estimate)))
     assert found is not None
     assert (found.roll_rms, found.pitch_rms) == pytest.approx((0.01, 0.0) if axis == 0 else (0.0, 0.01), abs=1e-12)
     assert (found.height_rms, found.odometry_share, found.nees) == (None, None, None)

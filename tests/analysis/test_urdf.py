@@ -7,8 +7,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 from stance import configuration
 from stance.errors import UnreadableError
-from stance.metrics import roll_pitch_yaw
 from stance.series import Run
+from stance.signals import roll_pitch_yaw
 from stance.urdf import parse_urdf, rotation_from_quaternion, rotation_from_rpy, transform
 from synthetic import URDF
 

@@ -19,9 +19,10 @@ from pathlib import Path
 import numpy as np
 from stance.errors import StanceError
 from stance.log import Log
-from stance.metrics import STAGES, Percentiles
+from stance.metrics import STAGES
 from stance.network import ensure
 from stance.run import RunRequest, record
+from stance.signals import Percentiles
 
 
 def percentiles(values: np.ndarray) -> dict[str, float]:
