@@ -84,8 +84,11 @@ class Robot:
         return tuple(by_name[name] for name in self.joint_names)
 
     def forward(self, q: Array, T_WB: Floats | None = None) -> dict[str, Floats]:
-        """Every link's frame in W, (4, 4). `q` [rad or m] in the order of `joint_names`; B is the root link."""
-        value = dict(zip(self.joint_names, np.asarray(q, float), strict=False))
+        """Every link's frame in W, (..., 4, 4), of postures `q` [rad or m] (..., joints) in the order of `joint_names`.
+
+        T_WB (..., 4, 4): B is the root link.
+        """
+        value = dict(zip(self.joint_names, np.moveaxis(np.asarray(q, float), -1, 0), strict=False))
         frames: dict[str, Floats] = {self.root: np.eye(4) if T_WB is None else np.asarray(T_WB, float)}
         waiting = list(self.joints)
         while waiting:
@@ -96,12 +99,10 @@ class Robot:
         return frames
 
     def center_of_mass(self, q: Array, T_WB: Floats | None = None) -> Floats:
-        """p_WC [m], (3,)."""
+        """p_WC [m], (..., 3), of postures as in `forward`."""
         frames = self.forward(q, T_WB)
-        moment = np.zeros(3)
-        for name, link in self.links.items():
-            moment += link.mass * (frames[name] @ np.append(link.com, 1.0))[:3]
-        return np.asarray(moment / self.mass)
+        moments = (link.mass * (frames[name] @ np.append(link.com, 1.0))[..., :3] for name, link in self.links.items())
+        return np.asarray(sum(moments) / self.mass)
 
     def feet(self) -> list[tuple[str, Floats]]:
         """(link, centre of its collision sphere in the link's frame) of the tree's leaves, in the URDF's order."""
@@ -130,9 +131,9 @@ def rotation_from_quaternion(quaternion: Array) -> Floats:
 
 
 def transform(rotation: Array, position: Array) -> Floats:
-    """(4, 4) from R (3, 3) and p [m] (3,)."""
-    result = np.eye(4)
-    result[:3, :3], result[:3, 3] = rotation, position
+    """(..., 4, 4) from R (..., 3, 3) and p [m] (..., 3)."""
+    result = np.zeros((*np.broadcast_shapes(rotation.shape[:-2], position.shape[:-1]), 4, 4))
+    result[..., :3, :3], result[..., :3, 3], result[..., 3, 3] = rotation, position, 1.0
     return result
 
 
@@ -209,9 +210,11 @@ def _joint(element: ElementTree.Element) -> Joint:
     )
 
 
-def _motion(joint: Joint, value: float) -> Floats:
+def _motion(joint: Joint, value: Array | float) -> Floats:
+    """(..., 4, 4) of values [rad or m] (...)."""
+    along = np.asarray(value)[..., None] * joint.axis
     if joint.kind == "prismatic":
-        return transform(np.eye(3), joint.axis * value)
+        return transform(np.eye(3), along)
     if joint.kind not in MOVING:
         return np.eye(4)
-    return transform(Rotation.from_rotvec(value * joint.axis).as_matrix(), np.zeros(3))
+    return transform(Rotation.from_rotvec(along).as_matrix(), np.zeros(3))

@@ -59,6 +59,18 @@ def test_feet_are_where_the_truth_has_them(stand: Run) -> None:
             assert (frames[name] @ np.append(centre, 1.0))[:3] == pytest.approx(tip, abs=1e-9)
 
 
+def test_many_postures_at_once_are_each_of_them(stand: Run) -> None:
+    body = configuration.robot(stand)
+    assert body is not None
+    q, rows = stand.field("TRUTH", "joint_position"), slice(165, 172)
+    T_WB = transform(rotation_from_quaternion(stand.field("TRUTH", "quat_WB")), stand.field("TRUTH", "p_WB"))
+    together, centres = body.forward(q[rows], T_WB[rows]), body.center_of_mass(q[rows], T_WB[rows])
+    for i, row in enumerate(range(*rows.indices(len(q)))):
+        alone = body.forward(q[row], T_WB[row])
+        assert all(np.allclose(together[name][i], alone[name], atol=1e-15) for name in alone)
+        assert np.allclose(centres[i], body.center_of_mass(q[row], T_WB[row]), atol=1e-15)
+
+
 def test_the_whole_body_turns_with_its_base() -> None:
     body = parse_urdf(URDF)
     q = np.linspace(-0.3, 0.4, 8)
