@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from . import signals
-from .series import Array, Floats, Integers, Run
+from .series import Array, Floats, Run
 
 MIN_PATH = 1.0  # m, below it drift is no share of the path
+NEES_FREEDOM = 5  # degrees, of `Errors.nees`
 
 
 @dataclass(frozen=True)
@@ -31,6 +33,10 @@ class EstimatorError:
     """rad"""
     heading_velocity_rms: float
     """m/s, of the worst axis: estimate and truth each in their own heading frame, since yaw is not observed"""
+    heading_velocity_rms_standing: float | None
+    """the same, of the time without a gait"""
+    heading_velocity_rms_walking: float | None
+    """the same, of the time with one"""
     height_rms: float | None
     """m, of B over the feet that bear load"""
     odometry_share: float | None
@@ -40,54 +46,116 @@ class EstimatorError:
     stated sigma are right; None where one is 0"""
 
 
-def estimator_error(run: Run) -> EstimatorError | None:
+@dataclass(frozen=True)
+class Errors:
+    """Estimate less truth at every tick that took a new state, n of them, and one standard deviation as stated."""
+
+    time: Floats
+    """s, (n,)"""
+    position: Floats
+    """m, (n, 3), of B in W"""
+    position_sigma: Floats
+    angles: Floats
+    """rad, (n, 3), roll, pitch and yaw"""
+    angles_sigma: Floats
+    """rad, (n, 3), about the heading frame's axes"""
+    velocity: Floats
+    """m/s, (n, 3), estimate and truth each in their own heading frame"""
+    velocity_sigma: Floats
+    height: Floats
+    """m, (n, contacts), of B over each foot; nan over one that bears no load"""
+    nis: Floats
+    """(n,), normalised innovation squared per degree of freedom"""
+    walking: Array
+    """(n,) bool, whether the robot had a gait"""
+
+    @property
+    def nees(self) -> Floats:
+        """(n,), normalised error squared per degree of freedom of roll, pitch and velocity, which are observed.
+
+        By the stated standard deviations, without correlations: they are not in the log. nan where one is 0.
+        """
+        error = np.column_stack([self.angles[:, :2], self.velocity])
+        sigma = np.column_stack([self.angles_sigma[:, :2], self.velocity_sigma])
+        return np.asarray(np.square(error / np.where(sigma > 0.0, sigma, np.nan)).mean(axis=1))
+
+
+def errors(run: Run) -> Errors | None:
+    """None where the log lacks the truth, the estimate or every instant that they share."""
     if "TRUTH" not in run or "CONTROLLER_TRACE" not in run:
         return None
     rows, truth_rows = signals.truth_of_ticks(run)
     if not len(rows):
         return None
 
-    def both(name: str) -> tuple[Array, Array]:
-        return run.field("CONTROLLER_TRACE", name)[rows], run.field("TRUTH", name)[truth_rows]
+    def estimate(name: str) -> Array:
+        return run.field("CONTROLLER_TRACE", name)[rows]
 
-    estimate, truth = both("p_WB")
-    error = estimate - truth
-    distance = np.linalg.norm(error, axis=1)
-    v_estimate, v_truth = both("v_WB")
-    q_estimate, q_truth = both("quat_WB")
-    turn_estimate, turn_truth = signals.roll_pitch_yaw(q_estimate), signals.roll_pitch_yaw(q_truth)
-    turned = np.angle(np.exp(1j * (turn_estimate - turn_truth)))
-    v_error = signals.in_heading(v_estimate, turn_estimate[:, 2]) - signals.in_heading(v_truth, turn_truth[:, 2])
-    sigma_v, sigma_theta = (run.field("CONTROLLER_TRACE", name)[rows] for name in ("sigma_v", "sigma_theta"))
-    sigma = np.column_stack([sigma_theta[:, :2], sigma_v])
-    normalised = np.column_stack([turned[:, :2], v_error]) / np.where(sigma > 0.0, sigma, np.nan)
-    path = signals.path_length(truth, run.time("TRUTH")[truth_rows])
-    return EstimatorError(
-        position_rms=signals.rms(distance),
-        position_max=float(distance.max()),
-        position_drift=float(np.linalg.norm(error[-1] - error[0])),
-        velocity_rms=signals.rms(np.linalg.norm(v_estimate - v_truth, axis=1)),
-        tilt_max_deg=float(np.degrees(np.abs(_tilt_between(q_estimate, q_truth)).max())),
-        yaw_max_deg=float(np.degrees(np.abs(turned[:, 2])).max()),
-        roll_rms=signals.rms(turned[:, 0]),
-        pitch_rms=signals.rms(turned[:, 1]),
-        heading_velocity_rms=max(signals.rms(v_error[:, axis]) for axis in range(3)),
-        height_rms=_height_rms(run, rows, truth_rows),
-        odometry_share=float(np.linalg.norm((error[-1] - error[0])[:2])) / path if path >= MIN_PATH else None,
-        nees=None if np.isnan(normalised).any() else float(np.mean(np.square(normalised))),
+    def truth(name: str) -> Array:
+        return run.field("TRUTH", name)[truth_rows]
+
+    turned, true_turned = signals.roll_pitch_yaw(estimate("quat_WB")), signals.roll_pitch_yaw(truth("quat_WB"))
+    yaw = turned[:, 2]
+    feet = slice(signals.num_contacts(run))
+    height = _height(estimate, feet) - _height(truth, feet)
+    return Errors(
+        time=run.time("CONTROLLER_TRACE")[rows],
+        position=estimate("p_WB") - truth("p_WB"),
+        position_sigma=estimate("sigma_p"),
+        angles=np.angle(np.exp(1j * (turned - true_turned))),
+        angles_sigma=_sigma_in_heading(estimate("sigma_theta"), yaw),
+        velocity=signals.in_heading(estimate("v_WB"), yaw) - signals.in_heading(truth("v_WB"), true_turned[:, 2]),
+        velocity_sigma=_sigma_in_heading(estimate("sigma_v"), yaw),
+        height=np.where(truth("f_F_W")[:, feet, 2] > signals.MIN_NORMAL_FORCE, height, np.nan),
+        nis=estimate("nis"),
+        walking=estimate("gait_phase") != signals.STANDING,
     )
 
 
-def _height_rms(run: Run, rows: Integers, truth_rows: Integers) -> float | None:
-    """m, error of B's height over the feet that bear load; None where none ever does."""
-    feet = slice(signals.num_contacts(run))
-    loaded = run.field("TRUTH", "f_F_W")[truth_rows][:, feet, 2] > signals.MIN_NORMAL_FORCE
+def _height(of: Callable[[str], Array], feet: slice) -> Floats:
+    """m, (n, contacts), of B over each foot."""
+    return np.asarray(of("p_WB")[:, None, 2] - of("p_WF")[:, feet, 2])
 
-    def height(channel: str, at: Integers) -> Floats:
-        return np.asarray(run.field(channel, "p_WB")[at][:, None, 2] - run.field(channel, "p_WF")[at][:, feet, 2])
 
-    error = height("CONTROLLER_TRACE", rows) - height("TRUTH", truth_rows)
-    return signals.rms(error[loaded]) if loaded.any() else None
+def _sigma_in_heading(sigma_W: Array, yaw: Array) -> Floats:
+    """Standard deviations (n, 3) along W's axes → along those of the heading frame, as if they were not correlated."""
+    cos, sin = np.cos(yaw), np.sin(yaw)
+    x, y, z = sigma_W.T
+    return np.column_stack([np.hypot(cos * x, sin * y), np.hypot(sin * x, cos * y), z])
+
+
+def estimator_error(run: Run) -> EstimatorError | None:
+    found = errors(run)
+    if found is None:
+        return None
+    rows, truth_rows = signals.truth_of_ticks(run)
+    distance = np.linalg.norm(found.position, axis=1)
+    v_error = run.field("CONTROLLER_TRACE", "v_WB")[rows] - run.field("TRUTH", "v_WB")[truth_rows]
+    quaternions = run.field("CONTROLLER_TRACE", "quat_WB")[rows], run.field("TRUTH", "quat_WB")[truth_rows]
+    path = signals.path_length(run.field("TRUTH", "p_WB")[truth_rows], run.time("TRUTH")[truth_rows])
+    drift = found.position[-1] - found.position[0]
+    height = found.height[~np.isnan(found.height)]
+    nees = found.nees
+
+    def worst_axis(among: Array) -> float | None:
+        return max(signals.rms(found.velocity[among, axis]) for axis in range(3)) if among.any() else None
+
+    return EstimatorError(
+        position_rms=signals.rms(distance),
+        position_max=float(distance.max()),
+        position_drift=float(np.linalg.norm(drift)),
+        velocity_rms=signals.rms(np.linalg.norm(v_error, axis=1)),
+        tilt_max_deg=float(np.degrees(np.abs(_tilt_between(*quaternions)).max())),
+        yaw_max_deg=float(np.degrees(np.abs(found.angles[:, 2])).max()),
+        roll_rms=signals.rms(found.angles[:, 0]),
+        pitch_rms=signals.rms(found.angles[:, 1]),
+        heading_velocity_rms=max(signals.rms(found.velocity[:, axis]) for axis in range(3)),
+        heading_velocity_rms_standing=worst_axis(~found.walking),
+        heading_velocity_rms_walking=worst_axis(found.walking),
+        height_rms=signals.rms(height) if len(height) else None,
+        odometry_share=float(np.linalg.norm(drift[:2])) / path if path >= MIN_PATH else None,
+        nees=None if np.isnan(nees).any() else float(nees.mean()),
+    )
 
 
 def _tilt_between(first: Array, second: Array) -> Floats:

@@ -13,6 +13,8 @@ from .series import Array, Floats, Integers, Run, match
 from .urdf import rotation_from_quaternion
 
 MIN_NORMAL_FORCE = 5.0  # N, below it a contact's friction ratio says nothing
+BEHAVIOURS = ("stand", "walk", "lie_down", "track", "catch")  # values of user_command_t.behaviour
+STANDING, DOUBLE_SUPPORT, SINGLE_SUPPORT = range(3)  # values of controller_trace_t.gait_phase
 PATH_STEP = 1.0  # s between the points that measure a path, so that sway is none of it
 
 
@@ -34,6 +36,23 @@ class Percentiles:
             return None
         p50, p99, p99_9 = (float(value) for value in np.percentile(finite, [50.0, 99.0, 99.9], method="higher"))
         return cls(p50, p99, p99_9, float(finite.max()))
+
+
+@dataclass(frozen=True)
+class Spread:
+    """Of a quantity that comes once a step or so, in the unit that its name says."""
+
+    mean: float
+    std: float
+    min: float
+    max: float
+
+    @classmethod
+    def of(cls, values: Array) -> Spread | None:
+        """None where there are none."""
+        if not len(values):
+            return None
+        return cls(float(np.mean(values)), float(np.std(values)), float(np.min(values)), float(np.max(values)))
 
 
 def period(run: Run) -> float:
@@ -114,3 +133,8 @@ def largest(values: Array) -> float | None:
 
 def rms(values: Array) -> float:
     return float(np.sqrt(np.mean(np.square(values)))) if np.size(values) else 0.0
+
+
+def name_of(names: tuple[str, ...], value: int) -> str:
+    """Of a value of a message."""
+    return names[value] if 0 <= value < len(names) else f"unknown_{value}"

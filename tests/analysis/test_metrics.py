@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from stance import metrics, signals
-from stance.estimation import estimator_error
+from stance.estimation import errors, estimator_error
 from stance.log import Log
 from stance.messages import message_type
 from stance.metrics import measure
@@ -43,8 +43,13 @@ def test_the_names_of_values_are_those_of_the_messages() -> None:
     assert [getattr(trace_type, name.upper()) for name in metrics.FAULTS] == list(range(trace_type.NUM_FAULTS))
     assert [getattr(trace_type, name.upper()) for name in metrics.SAFETY_MODES] == [0, 1, 2, 3]
     assert [getattr(trace_type, "QP_" + name.upper()) for name in metrics.QP_STATUS] == list(range(6))
+    assert [trace_type.STANDING, trace_type.DOUBLE_SUPPORT, trace_type.SINGLE_SUPPORT] == [
+        signals.STANDING,
+        signals.DOUBLE_SUPPORT,
+        signals.SINGLE_SUPPORT,
+    ]
     behaviours = message_type("user_command_t").python_class
-    assert [getattr(behaviours, name.upper()) for name in metrics.BEHAVIOURS] == list(range(5))
+    assert [getattr(behaviours, name.upper()) for name in signals.BEHAVIOURS] == list(range(5))
 
 
 def test_percentiles_are_values_that_occurred() -> None:
@@ -315,6 +320,33 @@ def test_the_estimators_errors_are_those_of_a_robot_that_does_not_know_its_yaw()
     assert found.height_rms == pytest.approx(0.003)
     assert found.odometry_share == pytest.approx(np.sqrt(2.0))
     assert found.nees == pytest.approx(2.0**2 / 5.0)
+
+
+def test_the_stated_sigma_turn_with_the_heading() -> None:
+    messages, estimate = truth(), trace()
+    half = np.radians(90.0) / 2
+    messages["quat_WB"][:] = estimate["quat_WB"][:] = np.cos(half), 0.0, 0.0, np.sin(half)
+    estimate["v_WB"][:, 1] = 0.03  # forward
+    estimate["sigma_v"], estimate["sigma_theta"] = (0.001, 0.03, 0.002), (0.004, 0.005, 0.006)
+    found = errors(run_of(base(TRUTH=messages, CONTROLLER_TRACE=estimate)))
+    assert found is not None
+    assert found.velocity[7] == pytest.approx([0.03, 0.0, 0.0])
+    assert found.velocity_sigma[7] == pytest.approx([0.03, 0.001, 0.002])
+    assert found.angles_sigma[7] == pytest.approx([0.005, 0.004, 0.006])
+    assert found.nees == pytest.approx(np.full(N, 0.2))
+
+
+def test_the_velocitys_error_is_told_apart_by_whether_the_robot_has_a_gait() -> None:
+    messages, estimate = truth(), trace()
+    estimate["gait_phase"][40:80:2], estimate["gait_phase"][41:80:2] = signals.DOUBLE_SUPPORT, signals.SINGLE_SUPPORT
+    estimate["v_WB"][:, 1] = np.where(estimate["gait_phase"] == signals.STANDING, 0.002, 0.005)
+    run = run_of(base(TRUTH=messages, CONTROLLER_TRACE=estimate))
+    found = estimator_error(run)
+    assert found is not None
+    assert found.heading_velocity_rms_standing == pytest.approx(0.002)
+    assert found.heading_velocity_rms_walking == pytest.approx(0.005)
+    alone = estimator_error(run.between(0.4, 0.79))
+    assert alone is not None and alone.heading_velocity_rms_standing is None
 
 
 @pytest.mark.parametrize("axis", [0, 1])
