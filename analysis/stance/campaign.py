@@ -37,7 +37,7 @@ from pathlib import Path
 from statistics import median
 from typing import IO, Any
 
-from . import configuration, estimation, metrics, signals
+from . import configuration, estimation, metrics, signals, walking
 from .check import Finding, Limit, figure, judge, quantity
 from .errors import RunError, StanceError
 from .log import Log
@@ -51,7 +51,7 @@ ROLLOUT = "stance-rollout"
 FELL = 1  # its exit code for a robot that fell
 CONFIDENCE = 0.95
 TOLERANCE = 1e-12  # of a rate, which is a quotient of whole numbers
-MEASURING = (configuration, estimation, metrics, signals)  # what a figure of a log depends on
+MEASURING = (configuration, estimation, metrics, signals, walking)  # what a figure of a log depends on
 
 Progress = Callable[[int, int], None]
 """called with the trials done and in all"""

@@ -15,6 +15,7 @@ from .estimation import EstimatorError, estimator_error
 from .messages import CHANNELS
 from .series import Array, Floats, Integers, Run, missing_after, restarted
 from .signals import Percentiles
+from .walking import Segment, Walking, segments, walking
 
 if TYPE_CHECKING:
     from .log import LogReport
@@ -36,7 +37,6 @@ FAULTS = (
 )
 QP_STATUS = ("not_run", "solved", "max_iterations", "infeasible", "invalid_problem", "inaccurate")
 QP_NOT_RUN, QP_SOLVED = 0, 1
-BEHAVIOURS = ("stand", "walk", "lie_down", "track", "catch")
 REFUSALS = ("refused_stale", "refused_not_finite", "refused_order", "refused_run")
 
 
@@ -211,7 +211,7 @@ class Metrics:
     fell_at: float | None
     """s"""
     behaviour_final: str | None
-    """what the robot does at the end, one of BEHAVIOURS"""
+    """what the robot does at the end, one of signals.BEHAVIOURS"""
     trunk: Trunk | None
     center_of_mass: CenterOfMass | None
     ticks: Ticks | None
@@ -221,6 +221,10 @@ class Metrics:
     force_error: ForceError | None
     joints: Joints | None
     estimator: EstimatorError | None
+    walking: Walking | None
+    """None where the robot never had a gait"""
+    segments: list[Segment]
+    """between two user commands that want different things"""
     pushes: list[Push]
     refused: dict[str, int]
     refused_total: int
@@ -258,6 +262,8 @@ def measure(run: Run, report: LogReport | None = None) -> Metrics:
         force_error=force_error(run),
         joints=joints(run),
         estimator=estimator_error(run),
+        walking=walking(run),
+        segments=segments(run),
         pushes=pushes(run),
         refused=refused,
         refused_total=sum(refused.values()),
@@ -287,7 +293,7 @@ def behaviour_final(run: Run) -> str | None:
     """What the robot does at the end."""
     if "CONTROLLER_TRACE" not in run:
         return None
-    return _name(BEHAVIOURS, int(run.field("CONTROLLER_TRACE", "behaviour")[-1]))
+    return signals.name_of(signals.BEHAVIOURS, int(run.field("CONTROLLER_TRACE", "behaviour")[-1]))
 
 
 def trunk(run: Run) -> Trunk | None:
@@ -415,7 +421,9 @@ def force_qp(run: Run) -> ForceQp | None:
         return float(values.max(initial=0.0)) if np.isfinite(values).all() else float("inf")
 
     return ForceQp(
-        status={_name(QP_STATUS, value): int((status == value).sum()) for value in np.unique(status).tolist()},
+        status={
+            signals.name_of(QP_STATUS, value): int((status == value).sum()) for value in np.unique(status).tolist()
+        },
         failures=int((ran & (status != QP_SOLVED)).sum()),
         iterations=Percentiles.of(run.field("CONTROLLER_TRACE", "qp_iterations")[ran]),
         primal_residual_max=residual("qp_primal_residual"),
@@ -563,7 +571,7 @@ def faults(run: Run) -> dict[str, int]:
     count = run.field("CONTROLLER_TRACE", "fault_count")
     last = np.append(np.flatnonzero(restarted(run.channels["CONTROLLER_TRACE"])) - 1, len(count) - 1)
     total = count[last].sum(axis=0)
-    return {_name(FAULTS, i): int(value) for i, value in enumerate(total.tolist())}
+    return {signals.name_of(FAULTS, i): int(value) for i, value in enumerate(total.tolist())}
 
 
 def safety(run: Run) -> list[SafetyChange]:
@@ -573,7 +581,7 @@ def safety(run: Run) -> list[SafetyChange]:
     mode = run.field("CONTROLLER_TRACE", "safety")
     time = run.time("CONTROLLER_TRACE")
     rows = np.append(0, np.flatnonzero(np.diff(mode)) + 1)
-    return [SafetyChange(float(time[row]), _name(SAFETY_MODES, int(mode[row]))) for row in rows]
+    return [SafetyChange(float(time[row]), signals.name_of(SAFETY_MODES, int(mode[row]))) for row in rows]
 
 
 def channels(run: Run) -> list[ChannelUse]:
@@ -595,7 +603,3 @@ def log_quality(run: Run, report: LogReport) -> LogQuality:
     problems = report.problems()
     missing = sum(use.missing for use in channels(run))
     return LogQuality(not problems, missing, report.skipped_bytes, problems)
-
-
-def _name(names: tuple[str, ...], value: int) -> str:
-    return names[value] if 0 <= value < len(names) else f"unknown_{value}"

@@ -57,8 +57,8 @@ def _commands(run: Run) -> list[Event]:
             if wanted == before:
                 continue
             before = wanted
-            known = 0 <= behaviour < len(metrics.BEHAVIOURS)
-            name = metrics.BEHAVIOURS[behaviour] if known else f"behaviour {behaviour}"
+            known = 0 <= behaviour < len(signals.BEHAVIOURS)
+            name = signals.BEHAVIOURS[behaviour] if known else f"behaviour {behaviour}"
             text = f"{name}, velocity ({velocity[0]:+.2f}, {velocity[1]:+.2f}) m/s, "
             text += f"yaw rate {yaw_rate:+.2f} rad/s, height {height:+.3f} m"
             found.append(Event(float(time[row]), "command", text, bad=not known))

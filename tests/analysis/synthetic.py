@@ -1,6 +1,7 @@
 """Logs with known content: a biped that stands and takes pushes, written without any of the C++ programs.
 
-Not a simulation: a base that sways and swings back after a push, with joints, forces and messages that agree with it.
+Not a simulation: a base that sways and swings back after a push, and walks where it is told to, with joints, forces and
+messages that agree with it.
 """
 
 from __future__ import annotations
@@ -89,6 +90,64 @@ def ticked(type_name: str, count: int) -> npt.NDArray[np.void]:
     return result
 
 
+@dataclass(frozen=True)
+class Walk:
+    """Walking straight ahead from `start` on, left foot first; every figure of it is known."""
+
+    start: float
+    """s"""
+    speed: float
+    """m/s"""
+    swing: int = 20
+    """ticks"""
+    double_support: int = 5
+    """ticks"""
+    foothold_error: tuple[float, float] = (0.012, -0.005)
+    """m, forward and left, of each touchdown from the foothold that is planned last"""
+    foothold_change: float = 0.03
+    """m, left, from the foothold planned at lift-off to the one planned last"""
+    swing_error: float = 0.004
+    """m, of a swing foot above its reference"""
+    recovering: tuple[int, ...] = ()
+    """steps"""
+
+    def feet(self, n: int, p_WF: npt.NDArray[np.float64]) -> tuple[npt.NDArray[np.float64], list[tuple[int, int, int]]]:
+        """Tips [m] (n, 2, 3) of feet that start at p_WF, and (foot, first tick, touchdown's tick) of each step."""
+        way = np.tile(p_WF, (n, 1, 1))
+        first = round(self.start / PERIOD) + self.double_support
+        swings = []
+        while first < n:
+            foot, down = len(swings) % 2, first + self.swing
+            middle = (down + 0.5 * (self.swing + self.double_support)) * PERIOD - self.start
+            s = np.linspace(0.0, 1.0, self.swing + 1)[: n - first]
+            start, length = way[first, foot, 0], self.speed * middle + p_WF[foot, 0] - way[first, foot, 0]
+            way[first : down + 1, foot, 0] = start + length * s * s * (3.0 - 2.0 * s)
+            way[first : down + 1, foot, 2] += 0.06 * np.sin(np.pi * s)
+            way[down:, foot, 0] = start + length
+            swings.append((foot, first, down))
+            first = down + self.double_support
+        return way, swings
+
+    def write(self, trace: npt.NDArray[np.void], swings: list[tuple[int, int, int]]) -> None:
+        """The gait's fields."""
+        n = len(trace)
+        first = round(self.start / PERIOD)
+        trace["gait_phase"][first:], trace["behaviour"][first:] = 1, 1
+        trace["velocity_wanted"][first:, 0] = self.speed
+        for number, (foot, begin, down) in enumerate(swings):
+            rows = slice(begin, down)
+            reached = self.feet(down + 1, trace["p_WF"][0, :2])[0][down, foot]
+            trace["swing_foot"][down - self.swing - self.double_support : down] = foot
+            trace["gait_phase"][rows] = 2
+            trace["swing_time"][rows] = self.swing * PERIOD
+            trace["foothold"][rows] = reached - [*self.foothold_error, 0.0]
+            trace["foothold"][begin : begin + 1, 1] -= self.foothold_change
+            trace["swing_p"][rows] = trace["p_WF"][rows, foot] - [0.0, 0.0, self.swing_error]
+            trace["contact"][rows, foot] = 0
+            trace["recovering"][rows] = number in self.recovering
+            trace["steps"][min(down, n) :] = number + 1
+
+
 @dataclass
 class Synthetic:
     """What to write. Every list of times is in seconds from the run's start."""
@@ -108,6 +167,7 @@ class Synthetic:
     refused: int = 0
     estimator_drift: float = 0.0
     """m/s, along x"""
+    walk: Walk | None = None
 
     def messages(self) -> dict[str, npt.NDArray[np.void]]:
         """channel → encoded messages, in order."""
@@ -137,16 +197,21 @@ class Synthetic:
         quat_WB = np.stack(
             [cos_roll * cos_pitch, sin_roll * cos_pitch, cos_roll * sin_pitch, -sin_roll * sin_pitch], axis=1
         )
-        p_WF = np.array([[0.03, 0.10, 0.02], [0.03, -0.10, 0.02]])
+        p_WF, swings = np.tile([[0.03, 0.10, 0.02], [0.03, -0.10, 0.02]], (n, 1, 1)), []
+        if self.walk is not None:
+            p_WB[:, 0] += self.walk.speed * np.maximum(t - self.walk.start, 0.0)
+            p_WF, swings = self.walk.feet(n, p_WF[0])
         q, p_WC = np.zeros((n, 8)), np.zeros((n, 3))
         for i in range(n):
             R_WB = rotation_from_rpy(roll[i], pitch[i], 0.0)
             for leg, side in enumerate("lr"):
-                q[i, 4 * leg : 4 * leg + 4] = leg_ik(robot, side, R_WB.T @ (p_WF[leg] - p_WB[i]))
+                q[i, 4 * leg : 4 * leg + 4] = leg_ik(robot, side, R_WB.T @ (p_WF[i, leg] - p_WB[i]))
             p_WC[i] = robot.center_of_mass(q[i], transform(R_WB, p_WB[i]))
         v_WB, v_WC, qd = (np.gradient(values, PERIOD, axis=0) for values in (p_WB, p_WC, q))
         ground = MASS * (acceleration + np.array([0.0, 0.0, GRAVITY])) - force
         share = np.clip(0.5 + (p_WC[:, 1] - 0.05 * ground[:, 1] / 10) / 0.2, 0.1, 0.9)
+        for foot, begin, down in swings:
+            share[begin:down] = foot
         planned = np.stack([share[:, None] * ground, (1 - share)[:, None] * ground], axis=1)
         planned[..., :2] = np.clip(planned[..., :2], -0.5 * planned[..., 2:], 0.5 * planned[..., 2:])
         contact_force = planned + rng.normal(0.0, 0.4, planned.shape)
@@ -188,6 +253,8 @@ class Synthetic:
         plan["state_seq"], plan["num_contacts"], plan["num_stages"] = seq, 2, 10
         plan["stage_duration"][:, :10] = PERIOD
         plan["contact"][:, :10, :2] = 1
+        for foot, begin, down in swings:
+            plan["contact"][begin:down, :10, foot] = 0
         plan["p_WF"][:, :2], plan["force"][:, :10, :2] = p_WF, planned[:, None]
         plan["p_WC"][:, :10] = p_WC[:, None]
         plan["effort"] = np.sqrt(0.1 * (planned**2).sum(axis=(1, 2)))
@@ -202,6 +269,10 @@ class Synthetic:
         trace["x"][:, 0], trace["x"][:, 1] = roll, pitch
         trace["x"][:, 3:6], trace["x"][:, 9:12] = p_WC + drift, v_WC
         trace["x_ref"][:, 3:6] = p_WC[0]
+        trace["sigma_theta"], trace["sigma_v"], trace["sigma_p"] = 1e-3, 2e-3, 2e-4
+        trace["nis"] = rng.chisquare(12, n) / 12.0
+        if self.walk is not None:
+            self.walk.write(trace, swings)
         trace["qp_status"] = 1
         trace["qp_iterations"] = 25 * rng.integers(1, 4, n)
         trace["qp_primal_residual"] = 10 ** rng.uniform(-9, -6, n)
@@ -265,9 +336,12 @@ class Synthetic:
         for place, (channel, messages) in enumerate(self.messages().items()):
             for i, record in enumerate(messages):
                 result.append((WALL + round(i * PERIOD * 1e6) + 100 * place, channel, record.tobytes()))
-        command = records("user_command_t", 1)
-        command["utime"], command["seq"] = 5, 1
+        command = records("user_command_t", 2)
+        command["utime"], command["seq"] = [5, 6], [1, 2]
         result.append((WALL + 500_000, "USER_COMMAND", command[0].tobytes()))
+        if self.walk is not None:
+            command["behaviour"][1], command["velocity"][1, 0] = 1, self.walk.speed
+            result.append((WALL + round(1e6 * self.walk.start), "USER_COMMAND", command[1].tobytes()))
         return sorted(result, key=lambda event: event[0])
 
     def log(self) -> bytes:

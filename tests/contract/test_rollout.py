@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
+from stance import walking
 from stance.log import Log
 from stance.programs import SOURCE_TREE, find_program
 from stance.series import Run
@@ -53,6 +54,18 @@ def test_the_segments_are_what_the_truth_says(walked: tuple[dict[str, Any], Run]
     assert walk["mean_yaw_rate_rad_s"] == pytest.approx(turned / 4.5, abs=1e-9)
     moved = position[at["end"], :2] - position[at["start"], :2]
     assert walk["distance_m"] == pytest.approx(np.hypot(*moved), abs=1e-9)
+
+
+def test_a_log_is_measured_as_its_rollout_tells(walked: tuple[dict[str, Any], Run]) -> None:
+    told, run = walked
+    for one, of_log in zip(told["segments"], walking.segments(run), strict=True):
+        assert (of_log.start, of_log.end) == pytest.approx((one["start_s"], one["end_s"]))
+        assert of_log.behaviour == one["behaviour"]
+        assert of_log.velocity == pytest.approx(one["mean_velocity_m_s"], abs=1e-9)
+        assert of_log.yaw_rate == pytest.approx(one["mean_yaw_rate_rad_s"], abs=1e-9)
+        assert of_log.distance == pytest.approx(one["distance_m"], abs=1e-9)
+    found = walking.walking(run)
+    assert found is not None and found.steps == told["steps"]
 
 
 def test_the_steps_are_swings_that_the_plan_ends(walked: tuple[dict[str, Any], Run]) -> None:
