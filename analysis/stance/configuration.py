@@ -32,10 +32,18 @@ def value(run: Run, path: str) -> Any:
     return found
 
 
-def friction(run: Run) -> float | None:
-    """mu that the controller plans with."""
-    found = value(run, "controller.force_qp.friction")
-    return float(found) if isinstance(found, int | float) else None
+def friction(run: Run, walking: bool = False) -> float | None:
+    """mu that the controller plans with while it stands, or while it has a gait."""
+    paths = (["controller.walk.friction"] if walking else []) + ["controller.force_qp.friction"]
+    return next((float(mu) for path in paths if isinstance(mu := value(run, path), int | float)), None)
+
+
+def friction_text(run: Run) -> str:
+    """The same for people, as "µ = 0.55, walking 0.45"; empty where the log does not say."""
+    standing, walking = friction(run), friction(run, walking=True)
+    if standing is None:
+        return ""
+    return f"µ = {standing:g}" if walking in (None, standing) else f"µ = {standing:g}, walking {walking:g}"
 
 
 def robot(run: Run) -> Robot | None:

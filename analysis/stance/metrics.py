@@ -123,7 +123,9 @@ class ForceQp:
 @dataclass(frozen=True)
 class Friction:
     mu: float | None
-    """of the controller's configuration"""
+    """that the controller plans with while it stands"""
+    mu_walking: float | None
+    """the same while it has a gait"""
     planned_share_max: float | None
     """max(|fx|, |fy|) / (mu fz) of planned forces: 1 is the edge of the cone"""
     true_ratio_max: float | None
@@ -442,7 +444,24 @@ def planned_forces(run: Run) -> tuple[Floats, Array]:
     return force, planned & (run.field("FORCE_PLAN", "contact")[:, 0, :used] != 0)
 
 
-def cone_share(run: Run, channel: str, force: Array, mu: float | None) -> Floats:
+def friction_at(run: Run, channel: str) -> Floats:
+    """mu that the controller plans with at each instant of a channel, (n,); nan where the log does not say.
+
+    What TRUTH says is of the period that ended: of the tick before.
+    """
+    standing, walking = (
+        np.nan if mu is None else mu for mu in (configuration.friction(run, way) for way in (False, True))
+    )
+    if "CONTROLLER_TRACE" not in run:
+        return np.full(run.count(channel), standing)
+    time = run.time("CONTROLLER_TRACE")
+    order = np.argsort(time, kind="stable")
+    tick = np.searchsorted(time[order], run.time(channel), side="left" if channel == "TRUTH" else "right") - 1
+    gait = run.field("CONTROLLER_TRACE", "gait_phase")[order][np.maximum(tick, 0)] != signals.STANDING
+    return np.where(gait, walking, standing)
+
+
+def cone_share(run: Run, channel: str, force: Array) -> Floats:
     """max(|fx|, |fy|) / (mu fz) of forces [N] (n, contacts, 3) in W of a channel's instants → (n, contacts).
 
     Of the force QP's friction pyramid: its sides are along the reference's heading, not along W's axes; 1 is its edge.
@@ -457,7 +476,7 @@ def cone_share(run: Run, channel: str, force: Array, mu: float | None) -> Floats
     cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
     along = np.abs(cos * force[..., 0] + sin * force[..., 1])
     across = np.abs(cos * force[..., 1] - sin * force[..., 0])
-    return np.asarray(np.maximum(along, across) / ((mu or np.nan) * _loaded(force)))
+    return np.asarray(np.maximum(along, across) / (friction_at(run, channel)[:, None] * _loaded(force)))
 
 
 def _loaded(force: Array) -> Floats:
@@ -471,14 +490,13 @@ def friction_ratio(force: Array) -> Floats:
 
 
 def friction(run: Run) -> Friction:
-    mu = configuration.friction(run)
     share = ratio = None
-    if "FORCE_PLAN" in run and mu:
+    if "FORCE_PLAN" in run:
         force, contact = planned_forces(run)
-        share = signals.largest(np.where(contact, cone_share(run, "FORCE_PLAN", force, mu), np.nan))
+        share = signals.largest(np.where(contact, cone_share(run, "FORCE_PLAN", force), np.nan))
     if "TRUTH" in run:
         ratio = signals.largest(friction_ratio(run.field("TRUTH", "f_F_W")[:, : signals.num_contacts(run)]))
-    return Friction(mu, share, ratio)
+    return Friction(configuration.friction(run), configuration.friction(run, walking=True), share, ratio)
 
 
 def force_error(run: Run) -> ForceError | None:

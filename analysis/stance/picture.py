@@ -54,6 +54,8 @@ class Pose:
     """N, (3,)"""
     tilt: float
     """rad"""
+    mu: float | None
+    """that the controller plans with; None where the log does not say"""
 
 
 def _whole(run: Run) -> Integers:
@@ -90,7 +92,16 @@ def pose_at(run: Run, time: float) -> Pose:
         f_F_W=at("f_F_W")[:contacts],
         push_W=at("push_W"),
         tilt=float(signals.tilt(quaternion)),
+        mu=configuration.friction(run, _has_a_gait(run, float(run.time("TRUTH")[row]))),
     )
+
+
+def _has_a_gait(run: Run, time: float) -> bool:
+    """At the tick before `time` [s], whose plan the forces of that instant follow."""
+    if "CONTROLLER_TRACE" not in run:
+        return False
+    before = run.time("CONTROLLER_TRACE") < time
+    return bool(before.any() and run.field("CONTROLLER_TRACE", "gait_phase")[before][-1] != signals.STANDING)
 
 
 @styled
@@ -126,7 +137,6 @@ def picture(run: Run, instants: Sequence[float] | None = None, view: str | None 
         configuration.title(run),
     )
     axes = fig.subplots(len(rows), columns, squeeze=False)
-    mu = configuration.friction(run)
     centre = np.mean([row[0].T_WB[:3, 3] for row in poses], axis=0)
     for place, (seen, _, label) in enumerate(rows):
         for column, ax in enumerate(axes[place]):
@@ -134,20 +144,20 @@ def picture(run: Run, instants: Sequence[float] | None = None, view: str | None 
                 ax.set_axis_off()
                 continue
             pose = poses[place][column]
-            draw(ax, body, pose, seen, ghost=poses[place][0] if column else None, centre=centre, mu=mu, top=top)
+            draw(ax, body, pose, seen, ghost=poses[place][0] if column else None, centre=centre, top=top)
             words = f"t = {pose.time:.2f} s   tilt {np.degrees(pose.tilt):.1f}°"
             ax.set_title(words, fontsize=9, fontweight="normal", loc="center")
         if label:
             axes[place, 0].set_ylabel(f"{label}, seen from the {seen}", fontsize=9, color=style.PUSH_INK, labelpad=6)
-    _key(axes[-1, 0], mu, ghost if columns > 1 else "")
+    _key(axes[-1, 0], configuration.friction_text(run), ghost if columns > 1 else "")
     return fig
 
 
-def _key(ax: Axes, mu: float | None, ghost: str) -> None:
+def _key(ax: Axes, mu: str, ghost: str) -> None:
     """What the marks mean, below the first drawing."""
     left, y = ax.get_xlim()[0] + 0.02, -0.155
     _arrow(ax, np.array([left, y]), np.array([left + KEY_FORCE * FORCE_SCALE, y]), style.MUTED, 2.0, 14)
-    cone = f"shaded: friction cone, µ = {mu:g}" if mu else ""
+    cone = f"shaded: friction cone, {mu}" if mu else ""
     words = ax.annotate(
         "   ".join(filter(None, (f"{KEY_FORCE:.0f} N of the ground", "○ centre of mass", cone, ghost))),
         (left + KEY_FORCE * FORCE_SCALE + 0.03, y),
@@ -192,12 +202,11 @@ def draw(
     view: str,
     ghost: Pose | None = None,
     centre: Array | None = None,
-    mu: float | None = None,
     top: float = HEIGHT,
 ) -> None:
     """Draws one pose on an axis in metres of W, up to the height `top`.
 
-    `ghost` is another pose, faint behind it; `mu` that of the cones.
+    `ghost` is another pose, faint behind it.
     """
     plane = _plane(view)
     middle = (pose.T_WB[:3, 3] if centre is None else np.asarray(centre)) @ plane[0]
@@ -212,8 +221,8 @@ def draw(
     for foot, (tip, force) in enumerate(zip(pose.p_WF, pose.f_F_W, strict=True)):
         ground = np.array([tip @ plane[0], 0.0])
         arrow = force @ plane.T * FORCE_SCALE
-        if mu and force[2] > signals.MIN_NORMAL_FORCE:
-            edge = np.array([mu * CONE_HEIGHT, CONE_HEIGHT])
+        if pose.mu and force[2] > signals.MIN_NORMAL_FORCE:
+            edge = np.array([pose.mu * CONE_HEIGHT, CONE_HEIGHT])
             cone = [ground, ground + edge * [-1.0, 1.0], ground + edge]
             ax.add_patch(Polygon(cone, closed=True, fc=style.FEET[foot % len(style.FEET)], alpha=0.10, lw=0, zorder=3))
         if np.linalg.norm(arrow) > 0.01:

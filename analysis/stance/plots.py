@@ -328,17 +328,16 @@ def forces(run: Run) -> Figure:
             axes[row, foot].sharey(axes[row, 0])
             axes[row, foot].tick_params(labelleft=False)
     below = [fig.add_subplot(grid[4, halves[0]]), fig.add_subplot(grid[rows - 1, halves[1]])]
-    mu = configuration.friction(run)
     # A plan is for the period that begins with its tick, the truth is the mean of the period that ended: steps, both.
     if "FORCE_PLAN" in run:
         time, (planned, contact) = run.time("FORCE_PLAN"), metrics.planned_forces(run)
-        share = metrics.cone_share(run, "FORCE_PLAN", planned, mu)
+        share = metrics.cone_share(run, "FORCE_PLAN", planned)
         values = np.concatenate([planned, np.where(contact, share, np.nan)[..., None]], axis=-1)
         for (row, foot), ax in np.ndenumerate(axes):
             ax.step(time, values[:, foot, row], where="post", color=style.PLANNED, lw=2.6, label="planned")
     if "TRUTH" in run:
         time, true = run.time("TRUTH"), run.field("TRUTH", "f_F_W")[:, :used]
-        share = metrics.cone_share(run, "TRUTH", true, mu)
+        share = metrics.cone_share(run, "TRUTH", true)
         values = np.concatenate([true, share[..., None]], axis=-1)
         for (row, foot), ax in np.ndenumerate(axes):
             ax.step(time, values[:, foot, row], where="pre", color=style.FEET[foot], lw=0.9, label="true")
@@ -353,7 +352,9 @@ def forces(run: Run) -> Figure:
         time_axis(column, run)
         column[3].set_xlabel("")
         column[3].tick_params(labelbottom=False)
-    for row, label in enumerate(("$f_x$ [N]", "$f_y$ [N]", "$f_z$ [N]", f"share of the\npyramid, µ = {mu or 0:g}")):
+    for row, label in enumerate(
+        ("$f_x$ [N]", "$f_y$ [N]", "$f_z$ [N]", f"share of the pyramid,\n{configuration.friction_text(run)}")
+    ):
         axes[row, 0].set_ylabel(label)
     axes[0, -1].legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
     _effort_and_error(below, run, used)
@@ -364,8 +365,9 @@ def _effort_and_error(axes: list[Axes], run: Run, used: int) -> None:
     if "FORCE_PLAN" in run:
         axes[0].plot(run.time("FORCE_PLAN"), run.field("FORCE_PLAN", "effort"), color=style.SERIES[3])
         axes[0].set_ylim(0.0, None)
-    weight = configuration.value(run, "controller.stand.force_weight")
-    axes[0].set_title(r"Effort $\|f\|_R$" + (f", R = {weight:g} I, f in N" if isinstance(weight, float) else ""))
+    weights = [(way, configuration.value(run, f"controller.{way}.force_weight")) for way in ("stand", "walk")]
+    told = ", ".join(f"{weight:g} I ({way})" for way, weight in weights if isinstance(weight, float))
+    axes[0].set_title(r"Effort $\|f\|_R$" + (f", R = {told}, f in N" if told else ""))
     axes[0].set_ylabel(r"$(f^T R f)^{1/2}$")
     if "TRUTH" in run:
         error = np.linalg.norm(run.field("TRUTH", "force_error")[:, :used], axis=-1)

@@ -190,8 +190,7 @@ def _motion(metrics: Metrics) -> list[list[str]]:
         rows.append(("true less planned force, rms", metrics.force_error.rms, "N"))
         rows.append(("true less planned force, largest", metrics.force_error.max, "N"))
     friction = metrics.friction
-    if friction.mu is not None:
-        rows.append((f"friction cone used by the plan (µ = {friction.mu:g})", friction.planned_share_max, SHARE))
+    rows.append(("friction cone used by the plan", friction.planned_share_max, SHARE))
     rows.append(("tangential over normal force, true, largest", friction.true_ratio_max, ""))
     if metrics.estimator is not None:
         rows.append(("estimated position, error rms", metrics.estimator.position_rms, "m"))

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from stance import metrics, signals
+from stance import configuration, metrics, signals
 from stance.estimation import errors, estimator_error
 from stance.log import Log
 from stance.messages import message_type
@@ -246,9 +248,23 @@ def test_planned_and_true_forces_are_measured_by_one_pyramid_along_the_heading()
     plan["force"][:, 0, :2], messages["f_F_W"][:, :2] = force, force
     run = run_of(base(FORCE_PLAN=plan, TRUTH=messages, CONTROLLER_TRACE=decided))
     planned, _ = metrics.planned_forces(run)
-    shares = metrics.cone_share(run, "FORCE_PLAN", planned, 0.5)
-    assert metrics.cone_share(run, "TRUTH", run.field("TRUTH", "f_F_W")[:, :2], 0.5) == pytest.approx(shares)
-    assert shares[25] == pytest.approx(0.4, abs=1e-6)  # at 180 degrees
+    shares = metrics.cone_share(run, "FORCE_PLAN", planned)
+    assert metrics.cone_share(run, "TRUTH", run.field("TRUTH", "f_F_W")[:, :2]) == pytest.approx(shares)
+    assert shares[25] == pytest.approx(0.2 / 0.55, abs=1e-6)  # at 180 degrees
+
+
+def test_a_robot_that_walks_is_measured_by_the_friction_that_it_walks_with() -> None:
+    plan, messages, decided = ticked("force_plan_t", N), truth(), trace()
+    decided["gait_phase"][40:60], decided["gait_phase"][60:80] = signals.DOUBLE_SUPPORT, signals.SINGLE_SUPPORT
+    run = run_of(base(FORCE_PLAN=plan, TRUTH=messages, CONTROLLER_TRACE=decided))
+    assert metrics.friction_at(run, "FORCE_PLAN") == pytest.approx(np.full(N, 0.55))  # nothing else is in this log
+    assert run.controller is not None
+    text = run.controller.configuration + "  walk: {friction: 0.4}\n"
+    run = replace(run, controller=replace(run.controller, configuration=text))
+    planned = np.where((np.arange(N) >= 40) & (np.arange(N) < 80), 0.4, 0.55)
+    assert metrics.friction_at(run, "FORCE_PLAN") == pytest.approx(planned)
+    assert metrics.friction_at(run, "TRUTH") == pytest.approx(np.append(planned[:1], planned[:-1]))
+    assert configuration.friction_text(run) == "µ = 0.55, walking 0.4"
 
 
 def test_without_stages_there_is_no_plan() -> None:
