@@ -25,6 +25,7 @@ FORCE_SCALE = 0.004  # m of arrow per N
 PUSH_SCALE = 0.008  # m of arrow per N, of the push
 PUSH_LENGTH = 0.30  # m, the longest arrow of a push
 BOTTOM, HEIGHT = -0.20, 1.05  # m, of a drawing
+REACH = 0.15  # m, that the trunk may be off the drawing's middle
 MIN_STEP = 0.03  # s from a push's end to the largest tilt after it
 SIDE, FRONT = "side", "front"
 
@@ -115,7 +116,7 @@ def picture(run: Run, instants: Sequence[float] | None = None, view: str | None 
     if body is None:
         raise UnreadableError("no URDF in the log: the robot cannot be drawn")
     rows: list[tuple[str, Sequence[float], str]] = []
-    ghost = "pale: the first instant"
+    pale = "pale: the first instant"
     if instants is not None:
         rows.append((view or SIDE, list(instants), ""))
     else:
@@ -124,7 +125,7 @@ def picture(run: Run, instants: Sequence[float] | None = None, view: str | None 
             seen = view or (FRONT if abs(push.impulse_W[1]) > abs(push.impulse_W[0]) else SIDE)
             rows.append((seen, _instants_of(run, push), style.push_text(push)))
         if rows:
-            ghost = "pale: before the push"
+            pale = "pale: before the push"
         else:
             rows.append((view or SIDE, np.linspace(*run.span, 5)[1:-1].tolist(), ""))
     poses = [[pose_at(run, time) for time in times] for _, times, _ in rows]
@@ -137,20 +138,29 @@ def picture(run: Run, instants: Sequence[float] | None = None, view: str | None 
         configuration.title(run),
     )
     axes = fig.subplots(len(rows), columns, squeeze=False)
+    has_ghost = False
     centre = np.mean([row[0].T_WB[:3, 3] for row in poses], axis=0)
     for place, (seen, _, label) in enumerate(rows):
         for column, ax in enumerate(axes[place]):
             if column >= len(poses[place]):
                 ax.set_axis_off()
                 continue
-            pose = poses[place][column]
-            draw(ax, body, pose, seen, ghost=poses[place][0] if column else None, centre=centre, top=top)
+            pose, first = poses[place][column], poses[place][0]
+            middle = centre if _is_near(pose, centre, seen) else pose.T_WB[:3, 3]
+            ghost = first if column and _is_near(first, middle, seen) else None
+            has_ghost |= ghost is not None
+            draw(ax, body, pose, seen, ghost=ghost, centre=middle, top=top)
             words = f"t = {pose.time:.2f} s   tilt {np.degrees(pose.tilt):.1f}°"
             ax.set_title(words, fontsize=9, fontweight="normal", loc="center")
         if label:
             axes[place, 0].set_ylabel(f"{label}, seen from the {seen}", fontsize=9, color=style.PUSH_INK, labelpad=6)
-    _key(axes[-1, 0], configuration.friction_text(run), ghost if columns > 1 else "")
+    _key(axes[-1, 0], configuration.friction_text(run), pale if has_ghost else "")
     return fig
+
+
+def _is_near(pose: Pose, place: Array, view: str) -> bool:
+    """Whether both fit into one drawing."""
+    return abs(float((pose.T_WB[:3, 3] - place) @ _plane(view)[0])) < REACH
 
 
 def _key(ax: Axes, mu: str, ghost: str) -> None:

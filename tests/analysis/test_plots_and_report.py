@@ -22,7 +22,7 @@ from stance.picture import picture, pose_at
 from stance.report import MAX_EVENTS, analyse, figures, render, write, write_plots
 from stance.series import Run
 from stance.timeline import timeline
-from synthetic import PERIOD, WALL, Synthetic, encode_log, records, run_of, ticked
+from synthetic import PERIOD, WALL, Synthetic, Walk, encode_log, records, run_of, ticked
 
 
 def lonely() -> Run:
@@ -176,6 +176,15 @@ def test_the_picture_of_a_fall_is_in_order_whole_and_ends_with_it() -> None:
 def test_the_key_says_what_is_pale(stand: Run, instants: list[float] | None, key: str | None) -> None:
     words = " ".join(text.get_text() for ax in picture(stand, instants).axes for text in ax.texts)
     assert (key in words) if key else ("pale" not in words)
+
+
+def test_a_robot_that_walks_is_in_the_middle_of_each_of_its_drawings() -> None:
+    run = Log.from_bytes(Synthetic(duration=4.0, pushes=[], walk=Walk(start=0.5, speed=0.6)).log()).run()
+    figure = picture(run)
+    for ax, instant in zip(figure.axes, (1.0, 2.0, 3.0), strict=True):
+        low, high = ax.get_xlim()
+        assert 0.5 * (low + high) == pytest.approx(pose_at(run, instant).T_WB[0, 3], abs=0.15)
+    assert "pale" not in " ".join(text.get_text() for ax in figure.axes for text in ax.texts)
 
 
 def test_a_pose_is_the_logged_instant(stand: Run) -> None:
