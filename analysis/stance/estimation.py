@@ -62,6 +62,7 @@ class Errors:
     velocity: Floats
     """m/s, (n, 3), estimate and truth each in their own heading frame"""
     velocity_sigma: Floats
+    """m/s, (n, 3), along the same axes, yaw's part left out"""
     height: Floats
     """m, (n, contacts), of B over each foot; nan over one that bears no load"""
     nis: Floats
@@ -105,7 +106,7 @@ def errors(run: Run) -> Errors | None:
         angles=np.angle(np.exp(1j * (turned - true_turned))),
         angles_sigma=_sigma_in_heading(estimate("sigma_theta"), yaw),
         velocity=signals.in_heading(estimate("v_WB"), yaw) - signals.in_heading(truth("v_WB"), true_turned[:, 2]),
-        velocity_sigma=_sigma_in_heading(estimate("sigma_v"), yaw),
+        velocity_sigma=_sigma_in_heading(_without_yaw(estimate("sigma_v"), estimate), yaw),
         height=np.where(truth("f_F_W")[:, feet, 2] > signals.MIN_NORMAL_FORCE, height, np.nan),
         nis=estimate("nis"),
         walking=estimate("gait_phase") != signals.STANDING,
@@ -115,6 +116,17 @@ def errors(run: Run) -> Errors | None:
 def _height(of: Callable[[str], Array], feet: slice) -> Floats:
     """m, (n, contacts), of B over each foot."""
     return np.asarray(of("p_WB")[:, None, 2] - of("p_WF")[:, feet, 2])
+
+
+def _without_yaw(sigma_v: Array, of: Callable[[str], Array]) -> Floats:
+    """m/s, (n, 3) in W: `sigma_v` less what the yaw's uncertainty adds to it, which the heading frame's error has not.
+
+    A yaw error turns v: it adds (v_y sigma_yaw)^2 and (v_x sigma_yaw)^2 to the variances. As if the two were not
+    correlated; a tenth of `sigma_v` always stays.
+    """
+    v_WB, yaw_sigma = of("v_WB"), of("sigma_theta")[:, 2]
+    turning = np.column_stack([v_WB[:, 1], v_WB[:, 0], np.zeros(len(v_WB))]) * yaw_sigma[:, None]
+    return np.asarray(np.sqrt(np.maximum(np.square(sigma_v) - np.square(turning), np.square(0.1 * sigma_v))))
 
 
 def _sigma_in_heading(sigma_W: Array, yaw: Array) -> Floats:

@@ -10,18 +10,19 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
+from scipy.stats import chi2
 
-from . import configuration, metrics, signals, style
+from . import configuration, estimation, metrics, signals, style, walking
 from .check import Verdict
+from .gait_plots import footholds, gait, swing, velocity
 from .metrics import Metrics
 from .picture import drawable, picture
 from .plain import counted
 from .series import Array, Floats, Run
 from .signals import Percentiles
-from .style import new_figure, shade, styled, time_axis
+from .style import new_figure, shade, stance_bars, styled, time_axis
 
 WIDTH = 11.0  # inch
-CONTACT_FORCE = 5.0  # N, normal force above which the truth counts as a contact
 PARTS = (*metrics.STAGES, "publish, rest")  # of a tick: its stages, and what they leave of it
 TAIL = ((0.5, "p50"), (0.01, "p99"), (0.001, "p99.9"))  # share of ticks above → name
 
@@ -287,7 +288,7 @@ def center_of_mass(run: Run) -> Figure:
         ax.plot(time, 1000 * x[:, 3 + row], color=style.ESTIMATE, lw=0.9, label="estimated")
         ax.plot(time, 1000 * reference[:, 3 + row], color=style.REFERENCE, lw=1.0, ls=(0, (5, 2)), label="reference")
         ax.set_ylabel(f"{name} [mm]")
-        _at_least(ax, 4.0)
+        style.at_least(ax, 4.0)
     axes[0, 0].set_title("Centre of mass $p_{WC}$")
     for row, angle in enumerate(("roll", "pitch", "yaw")):
         ax = axes[row, 1]
@@ -297,21 +298,13 @@ def center_of_mass(run: Run) -> Figure:
         ax.plot(time, np.degrees(x[:, row]), color=style.ESTIMATE, lw=0.9)
         ax.plot(time, np.degrees(reference[:, row]), color=style.REFERENCE, lw=1.0, ls=(0, (5, 2)))
         ax.set_ylabel(f"{angle} [°]")
-        _at_least(ax, 0.5)
+        style.at_least(ax, 0.5)
     axes[0, 1].set_title("Trunk's orientation")
     for column in range(2):
         shade(list(axes[:, column]), run, label=column == 0)
         time_axis(list(axes[:, column]), run)
     axes[0, 1].legend(*axes[0, 0].get_legend_handles_labels(), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
     return fig
-
-
-def _at_least(ax: Axes, span: float) -> None:
-    """Keeps an axis from magnifying what is smaller than `span`."""
-    low, high = ax.get_ylim()
-    if high - low < span:
-        middle = (low + high) / 2
-        ax.set_ylim(middle - span / 2, middle + span / 2)
 
 
 @styled
@@ -342,7 +335,7 @@ def forces(run: Run) -> Figure:
         for (row, foot), ax in np.ndenumerate(axes):
             ax.step(time, values[:, foot, row], where="pre", color=style.FEET[foot], lw=0.9, label="true")
     for row, least in enumerate((2.0, 2.0, 10.0)):
-        _at_least(axes[row, 0], least)
+        style.at_least(axes[row, 0], least)
     axes[3, 0].set_ylim(0.0, max(1.12, min(axes[3, 0].get_ylim()[1], 3.0)))
     for foot, name in enumerate(configuration.foot_names(run, used)):
         column = list(axes[:, foot])
@@ -381,64 +374,6 @@ def _effort_and_error(axes: list[Axes], run: Run, used: int) -> None:
     for ax in axes:
         shade(ax, run)
         time_axis([ax], run)
-
-
-@styled
-def gait(run: Run) -> Figure:
-    """5: which foot stands when: planned, believed, felt by the switch, and true; and how the load is shared."""
-    used = signals.num_contacts(run)
-    names = configuration.foot_names(run, used)
-    kinds = [kind for kind in _contact_kinds(run, used) if kind is not None]
-    fig = new_figure(
-        WIDTH,
-        2.6 + 0.30 * max(used, 1) * max(len(kinds), 1),
-        "Gait: planned and measured contacts",
-        configuration.title(run),
-    )
-    top, bottom = fig.subplots(2, 1, sharex=True, height_ratios=[0.30 * used * len(kinds), 1.1])
-    ticks, labels = [], []
-    y = 0.0
-    for foot in range(used):
-        for name, time, contact, alpha in kinds:
-            spans = [
-                (float(time[first]), float(time[min(last + 1, len(time) - 1)] - time[first]))
-                for first, last in signals.intervals(contact[:, foot])
-            ]
-            top.broken_barh(spans, (y - 0.38, 0.76), facecolor=style.FEET[foot], alpha=alpha, lw=0)
-            ticks.append(y)
-            labels.append(f"{names[foot]}: {name}")
-            y += 1.0
-        y += 0.4
-    top.set_yticks(ticks, labels)
-    top.set_ylim(y - 0.6, -0.8)
-    top.grid(axis="y", visible=False)
-    top.set_title("Contact")
-    if "TRUTH" in run:
-        normal = np.maximum(run.field("TRUTH", "f_F_W")[:, :used, 2], 0.0)
-        total = np.maximum(normal.sum(axis=1), 1e-9)
-        for foot in range(used):
-            bottom.plot(run.time("TRUTH"), normal[:, foot] / total, color=style.FEET[foot], label=names[foot])
-        bottom.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=used)
-    bottom.set_ylim(-0.02, 1.02)
-    bottom.set_title("Share of the load, true")
-    bottom.set_ylabel("share")
-    shade([top, bottom], run, label=True)
-    time_axis([top, bottom], run)
-    return fig
-
-
-def _contact_kinds(run: Run, used: int) -> list[tuple[str, Floats, Array, float] | None]:
-    """(name, t, (n, contacts) bool, opacity) of every way in which the log knows contacts."""
-
-    def of(channel: str, name: str, find: Callable[[], Array], alpha: float) -> tuple[str, Floats, Array, float] | None:
-        return (name, run.time(channel), find(), alpha) if channel in run else None
-
-    return [
-        of("FORCE_PLAN", "planned", lambda: run.field("FORCE_PLAN", "contact")[:, 0, :used] != 0, 0.35),
-        of("CONTROLLER_TRACE", "believed", lambda: run.field("CONTROLLER_TRACE", "contact")[:, :used] != 0, 0.55),
-        of("ROBOT_STATE", "switch", lambda: run.field("ROBOT_STATE", "contact_switch")[:, -1, :used] != 0, 0.75),
-        of("TRUTH", "true", lambda: run.field("TRUTH", "f_F_W")[:, :used, 2] > CONTACT_FORCE, 1.0),
-    ]
 
 
 @styled
@@ -539,6 +474,77 @@ def force_qp(run: Run) -> Figure:
     return fig
 
 
+@styled
+def estimator(run: Run) -> Figure:
+    """10: the base's estimate less the truth within 2 sigma as it states them; whether it is honest: NEES and NIS."""
+    found = estimation.errors(run)
+    assert found is not None
+    fig = new_figure(WIDTH, 8.6, "Estimate less truth, within ±2 sigma as stated", configuration.title(run))
+    axes = fig.subplots(4, 3, sharex=True)
+    columns = (
+        ("Trunk's orientation", ("roll", "pitch", "yaw"), "mrad", found.angles, found.angles_sigma),
+        (
+            "Velocity $v_{WB}$ along the heading",
+            ("forward", "left", "up"),
+            "mm/s",
+            found.velocity,
+            found.velocity_sigma,
+        ),
+        ("Position $p_{WB}$", ("x", "y", "z"), "mm", found.position, found.position_sigma),
+    )
+    for column, (title, names, unit, error, sigma) in enumerate(columns):
+        for row, name in enumerate(names):
+            ax = axes[row, column]
+            band = 2000 * sigma[:, row]
+            ax.fill_between(found.time, -band, band, color=style.PLANNED, alpha=0.55, lw=0)
+            ax.plot(found.time, 1000 * error[:, row], color=style.TRUTH, lw=0.8)
+            ax.set_ylabel(f"{name} [{unit}]")
+            inside = 100 * float(np.mean(np.abs(error[:, row]) <= 2.0 * sigma[:, row]))
+            ax.text(0.99, 0.97, f"{inside:.0f}% within", transform=ax.transAxes, ha="right", va="top", fontsize=7.5)
+            settled = band[np.isfinite(band)]  # what it begins with may be far wider than what it comes to
+            widest = float(np.percentile(settled, 98.0)) if len(settled) else 0.0
+            _about_zero(ax, max(1000 * (signals.largest(np.abs(error[:, row])) or 0.0), widest))
+        axes[0, column].set_title(title)
+    nees, nis, height = axes[3]
+    _honesty(nees, found.time, found.nees, estimation.NEES_FREEDOM, "NEES per degree of freedom")
+    _honesty(nis, found.time, found.nis, None, "NIS per degree of freedom")
+    for foot, name in enumerate(configuration.foot_names(run, found.height.shape[1])):
+        height.plot(found.time, 1000 * found.height[:, foot], color=style.FEET[foot], lw=0.8, label=name)
+    height.legend(loc="upper left", ncols=2, fontsize=7.0)
+    height.set_title("Height over a loaded foot")
+    height.set_ylabel("[mm]")
+    _about_zero(height, 1000 * (signals.largest(np.abs(found.height)) or 0.0))
+    for column in range(3):
+        shade(list(axes[:, column]), run)
+        time_axis(list(axes[:, column]), run)
+    stance_bars(height, run)
+    return fig
+
+
+def _about_zero(ax: Axes, half: float) -> None:
+    """Limits that hold ±`half` [mm or mrad], and do not magnify what is smaller than 0.5."""
+    ax.set_ylim(-1.3 * max(half, 0.5), 1.3 * max(half, 0.5))
+
+
+def _honesty(ax: Axes, time: Floats, values: Floats, freedom: int | None, title: str) -> None:
+    """A normalised squared error: of each instant, its mean over 1 s, and the chi-squared band of its `freedom`."""
+    if freedom is not None:
+        low, high = chi2.ppf([0.025, 0.975], freedom) / freedom
+        ax.axhspan(low, high, color=style.PLANNED, alpha=0.35, lw=0, label="95% of χ²")
+    ax.plot(time, values, ".", color=style.TRUTH, ms=1.5, alpha=0.5)
+    known = np.isfinite(values)
+    seconds = np.arange(np.floor(time[0]), time[-1] + 1.0)
+    counts, _ = np.histogram(time[known], seconds)
+    sums, _ = np.histogram(time[known], seconds, weights=values[known])
+    means = np.divide(sums, counts, out=np.full(len(counts), np.nan), where=counts > 0)
+    ax.stairs(means, seconds, baseline=None, color=style.ESTIMATE, lw=1.6, label="mean of 1 s")
+    ax.axhline(1.0, color=style.REFERENCE, lw=0.8)
+    ax.set_yscale("log")
+    ax.set_ylim(0.03, 30.0)
+    ax.set_title(title)
+    ax.legend(loc="lower left", ncols=2, fontsize=7.0)
+
+
 @dataclass(frozen=True)
 class Plot:
     """One plot of the report."""
@@ -547,6 +553,10 @@ class Plot:
     draw: Callable[[Run], Figure]
     possible: Callable[[Run], bool]
     """whether the log holds what it draws: only then may it be drawn"""
+
+
+def _has_landed(run: Run) -> bool:
+    return len(walking.landed(walking.steps(run))) > 0
 
 
 PLOTS = {
@@ -558,7 +568,11 @@ PLOTS = {
         forces,
         lambda run: signals.num_contacts(run) > 0 and ("FORCE_PLAN" in run or "TRUTH" in run),
     ),
-    "gait": Plot("Contacts", gait, lambda run: signals.num_contacts(run) > 0),
+    "gait": Plot("Gait", gait, lambda run: signals.num_contacts(run) > 0),
+    "velocity": Plot("Velocity", velocity, lambda run: "CONTROLLER_TRACE" in run),
+    "footholds": Plot("Footholds from above", footholds, lambda run: "TRUTH" in run and _has_landed(run)),
+    "swing": Plot("Swing tracking and stance slip", swing, lambda run: len(walking.steps(run)) > 0),
+    "estimator": Plot("Estimator", estimator, lambda run: estimation.errors(run) is not None),
     "joints": Plot("Joints", joints, lambda run: metrics.joint_shares(run) is not None),
     "force_qp": Plot("Force QP", force_qp, lambda run: "CONTROLLER_TRACE" in run),
 }

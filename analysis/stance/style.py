@@ -9,11 +9,12 @@ from contextlib import contextmanager
 from typing import Any, ParamSpec
 
 import matplotlib
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from . import metrics, signals
+from . import metrics, signals, walking
 from .series import Run
 
 P = ParamSpec("P")
@@ -40,6 +41,8 @@ FEET = ("#1769aa", "#c2185b", "#2e8b57", "#8e5bb5")
 JOINTS = ("#1769aa", "#e07b1a", "#2e8b57", "#8e5bb5", "#c2185b", "#6d4c41", "#00897b", "#7a8793")
 STAGES = ("#b8c4d0", "#8fa3b5", "#7fb4d9", "#4f94c4", "#2e8b57", "#1769aa", "#e07b1a", "#d9a441", "#8e5bb5", "#a1887f")
 SERIES = ("#1769aa", "#e07b1a", "#2e8b57", "#8e5bb5")
+
+BAR = 0.035  # of an axis, the thickness of a stance bar
 
 RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -141,6 +144,25 @@ def shade(axes: Axes | Sequence[Axes], run: Run, label: bool = False) -> None:
             _beside(axes[0], run, (fell, fell), 0.0, "fell", BAD)
 
 
+def stance_bars(axes: Axes | Sequence[Axes], run: Run) -> None:
+    """Under the curves of time axes: a bar for each foot where the gait has it on the ground; nothing without a gait.
+
+    Makes room for them below the present limits: to be called last.
+    """
+    time, down = walking.phases(run) if "CONTROLLER_TRACE" in run else (np.empty(0), np.empty((0, 0)))
+    if down.all():
+        return
+    ends = np.append(time[1:], time[-1] + signals.period(run))
+    for ax in [axes] if isinstance(axes, Axes) else axes:
+        low, high = ax.get_ylim()
+        thick = BAR * (high - low)
+        for foot in range(down.shape[1]):
+            spans = [(time[first], ends[last] - time[first]) for first, last in signals.intervals(down[:, foot])]
+            y = low - (1.2 * foot + 1.4) * thick
+            ax.broken_barh(spans, (y, thick), facecolor=FEET[foot % len(FEET)], lw=0, zorder=0.7)
+        ax.set_ylim(low - (1.2 * down.shape[1] + 0.4) * thick, high)
+
+
 def _beside(ax: Axes, run: Run, span: tuple[float, float], height: float, text: str, colour: str) -> None:
     """Words at the right of what happened in `span` [s]; at its left where they would leave the axes."""
     left = span[1] - run.span[0] > 0.8 * run.duration
@@ -182,3 +204,11 @@ def time_axis(axes: Sequence[Axes], run: Run) -> None:
     for ax in axes:
         ax.set_xlim(first, last + signals.period(run))
     axes[-1].set_xlabel("time [s]")
+
+
+def at_least(ax: Axes, span: float) -> None:
+    """Keeps an axis from magnifying what is smaller than `span`."""
+    low, high = ax.get_ylim()
+    if high - low < span:
+        middle = (low + high) / 2
+        ax.set_ylim(middle - span / 2, middle + span / 2)

@@ -23,6 +23,21 @@ GRAVITY = 9.81  # m/s^2, of the cost of transport
 
 
 @dataclass(frozen=True)
+class Touchdown:
+    """The end of a swing."""
+
+    time: float
+    """s"""
+    swing_time: float
+    """s, since lift-off"""
+    reached: Floats
+    """m, (3,) in W, by the estimate"""
+    error: tuple[float, float]
+    """m, forward and left: the step from the standing foot that was made less the one that was planned last; each in
+    its own heading frame, since neither position nor yaw are observed"""
+
+
+@dataclass(frozen=True)
 class Step:
     """One swing. Positions [m] (3,) in W, by the controller's estimate."""
 
@@ -32,28 +47,18 @@ class Step:
     """of CONTROLLER_TRACE: the first and the last tick of the swing"""
     lift_off: float
     """s"""
-    touchdown: float | None
-    """s; None where the robot stood, fell or the log ended before"""
+    touchdown: Touchdown | None
+    """None where the robot stood, fell or the log ended before"""
     planned_time: float
     """s, of the swing, as planned at lift-off"""
     first_foothold: Floats
     """planned at lift-off"""
     foothold: Floats
     """planned in the swing's last tick"""
-    reached: Floats | None
-    """at touchdown"""
-    error: tuple[float, float] | None
-    """m, forward and left: the step from the standing foot that was made less the one that was planned last; each in
-    its own heading frame, since neither position nor yaw are observed"""
     recovering: bool
     """in any of its ticks"""
     crossing: bool
     """to the other side of the standing foot, planned in the last tick"""
-
-    @property
-    def time(self) -> float | None:
-        """s, that the swing took"""
-        return None if self.touchdown is None else self.touchdown - self.lift_off
 
 
 @dataclass(frozen=True)
@@ -144,31 +149,34 @@ def steps(run: Run) -> list[Step]:
     truth = dict(zip(*(rows.tolist() for rows in signals.truth_of_ticks(run)), strict=True)) if "TRUTH" in run else {}
     found = []
     for first, last in spans:
-        landed = last + 1 < len(time) and count[last + 1] == count[last] + 1
+        came_down = last + 1 < len(time) and count[last + 1] == count[last] + 1
         swing, row = int(foot[last]), last + 1
         plan = field("foothold")[last]
-        reached = feet[row, swing] if landed else None
-        error = None
-        if landed:
+        touchdown = None
+        if came_down:
             made = _made(run, row, truth.get(row), swing)
             planned = signals.in_heading((plan - feet[last, 1 - swing])[None], _yaw(run, "CONTROLLER_TRACE", last))[0]
             error = (float((made - planned)[0]), float((made - planned)[1]))
+            touchdown = Touchdown(float(time[row]), float(time[row] - time[first]), feet[row, swing], error)
         found.append(
             Step(
                 foot=swing,
                 rows=(first, last),
                 lift_off=float(time[first]),
-                touchdown=float(time[row]) if landed else None,
+                touchdown=touchdown,
                 planned_time=float(field("swing_time")[first]),
                 first_foothold=field("foothold")[first],
                 foothold=plan,
-                reached=reached,
-                error=error,
                 recovering=bool(field("recovering")[first : last + 1].any()),
                 crossing=bool(field("crossing")[last] != 0),
             )
         )
     return found
+
+
+def landed(made: list[Step]) -> list[tuple[Step, Touchdown]]:
+    """Those with a touchdown."""
+    return [(step, step.touchdown) for step in made if step.touchdown is not None]
 
 
 def _made(run: Run, row: int, truth_row: int | None, swing: int) -> Floats:
@@ -258,7 +266,7 @@ def segments(run: Run) -> list[Segment]:
     if "USER_COMMAND" not in run or not ("TRUTH" in run or "CONTROLLER_TRACE" in run):
         return []
     time, position, yaw = _path(run)
-    landed = [step.touchdown for step in steps(run) if step.touchdown is not None]
+    touchdowns = [down.time for _, down in landed(steps(run))]
     found = []
     for start, end, row in _stretches(run):
         rows = np.flatnonzero((time >= start - 1e-9) & (time <= end + 1e-9))
@@ -282,7 +290,7 @@ def segments(run: Run) -> list[Segment]:
                 velocity=(float(velocity[0]), float(velocity[1])),
                 yaw_rate=float((yaw[last] - yaw[settled]) / span),
                 distance=float(np.linalg.norm((position[last] - position[first])[:2])),
-                steps=sum(start < at <= end for at in landed),
+                steps=sum(start < at <= end for at in touchdowns),
                 cost_of_transport=_cost_of_transport(run, (float(time[first]), float(time[last]))),
             )
         )
@@ -308,25 +316,24 @@ def _stretches(run: Run) -> list[tuple[float, float, int]]:
 def walking(run: Run) -> Walking | None:
     """None where the robot never had a gait."""
     made = steps(run)
-    landed = [step for step in made if step.touchdown is not None]
     if not made:
         return None
+    ends = landed(made)
     rows = np.flatnonzero(run.field("CONTROLLER_TRACE", "gait_phase") != STANDING)
     ticks = run.time("CONTROLLER_TRACE")[rows]
-    error = np.array([step.error for step in landed]).reshape(-1, 2)
-    change = np.array([step.foothold - step.first_foothold for step in landed]).reshape(-1, 3)
-    times = np.array([step.time for step in landed])
-    touchdowns = np.array([step.touchdown for step in landed])
+    error = np.array([down.error for _, down in ends]).reshape(-1, 2)
+    change = np.array([step.foothold - step.first_foothold for step, _ in ends]).reshape(-1, 3)
+    times = np.array([down.swing_time for _, down in ends])
     slid = slip(run)
     time, position, _ = _path(run)
     on_the_way = (time >= ticks[0]) & (time <= ticks[-1])
     return Walking(
-        steps=len(landed),
-        recovering=sum(step.recovering for step in landed),
-        crossing=sum(step.crossing for step in landed),
-        step_time=Spread.of(_within_a_gait(run, touchdowns)),
+        steps=len(ends),
+        recovering=sum(step.recovering for step, _ in ends),
+        crossing=sum(step.crossing for step, _ in ends),
+        step_time=Spread.of(_within_a_gait(run, np.array([down.time for _, down in ends]))),
         swing_time=Spread.of(times),
-        swing_time_change=Spread.of(times - [step.planned_time for step in landed]),
+        swing_time_change=Spread.of(times - [step.planned_time for step, _ in ends]),
         foothold_forward=Spread.of(error[:, 0]),
         foothold_left=Spread.of(error[:, 1]),
         foothold_error=Percentiles.of(np.linalg.norm(error, axis=1)),

@@ -343,13 +343,23 @@ def test_the_stated_sigma_turn_with_the_heading() -> None:
     half = np.radians(90.0) / 2
     messages["quat_WB"][:] = estimate["quat_WB"][:] = np.cos(half), 0.0, 0.0, np.sin(half)
     estimate["v_WB"][:, 1] = 0.03  # forward
-    estimate["sigma_v"], estimate["sigma_theta"] = (0.001, 0.03, 0.002), (0.004, 0.005, 0.006)
+    estimate["sigma_v"], estimate["sigma_theta"] = (0.001, 0.03, 0.002), (0.004, 0.005, 0.0)
     found = errors(run_of(base(TRUTH=messages, CONTROLLER_TRACE=estimate)))
     assert found is not None
     assert found.velocity[7] == pytest.approx([0.03, 0.0, 0.0])
     assert found.velocity_sigma[7] == pytest.approx([0.03, 0.001, 0.002])
-    assert found.angles_sigma[7] == pytest.approx([0.005, 0.004, 0.006])
+    assert found.angles_sigma[7] == pytest.approx([0.005, 0.004, 0.0])
     assert found.nees == pytest.approx(np.full(N, 0.2))
+
+
+def test_what_yaw_adds_to_the_velocitys_sigma_is_no_uncertainty_along_the_heading() -> None:
+    estimate = trace()
+    estimate["v_WB"][:, 0] = 0.5
+    estimate["sigma_theta"][:, 2] = 0.03
+    estimate["sigma_v"][:] = 0.004, np.hypot(0.003, 0.015), 0.005
+    found = errors(run_of(base(TRUTH=truth(), CONTROLLER_TRACE=estimate)))
+    assert found is not None
+    assert found.velocity_sigma[7] == pytest.approx([0.004, 0.003, 0.005])
 
 
 def test_the_velocitys_error_is_told_apart_by_whether_the_robot_has_a_gait() -> None:

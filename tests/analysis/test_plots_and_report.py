@@ -36,6 +36,9 @@ def without_truth() -> Run:
     return run_of({name: values for name, values in Synthetic(duration=0.5).messages().items() if name != "TRUTH"})
 
 
+WALKING = {"footholds", "swing"}
+"""plots that need steps"""
+
 RENDERED = (
     "stand",
     "fall",
@@ -64,6 +67,10 @@ KINDS = {
     "diverged": lambda: diverged(35),
     "never finite": lambda: diverged(0),
     "one state": lambda: run_of({"ROBOT_STATE": ticked("robot_state_t", 1)}),
+    "walk": lambda: Log.from_bytes(
+        Synthetic(duration=3.0, pushes=[(1.9, 0.1, (5.0, 0.0, 0.0))], walk=Walk(start=0.5, speed=0.4)).log()
+    ).run(),
+    "one step": lambda: run_of(Synthetic(duration=0.75, pushes=[], walk=Walk(start=0.2, speed=0.0)).messages()),
     "a part": lambda: Log.from_bytes(Synthetic(duration=3.0).log()).run().between(1.4, 1.9),
 }
 
@@ -88,12 +95,12 @@ def test_every_plot_that_is_possible_draws_without_a_warning(name: str, any_run:
 
 
 def test_a_plot_is_offered_where_the_log_can_give_it(stand: Run) -> None:
-    assert plots.available(stand) == plots.PLOTS
-    assert set(plots.PLOTS) - set(plots.available(without_truth())) == {"picture"}
+    assert set(plots.PLOTS) - set(plots.available(stand)) == WALKING
+    assert set(plots.PLOTS) - set(plots.available(without_truth())) == {"picture", "estimator", *WALKING}
     rollout = run_of(
         {name: rows for name, rows in Synthetic(duration=0.5).messages().items() if name != "CONTROLLER_TIMING"}
     )
-    assert set(plots.PLOTS) - set(plots.available(rollout)) == {"timing"}
+    assert set(plots.PLOTS) - set(plots.available(rollout)) == {"timing", *WALKING}
     assert set(plots.available(lonely())) == {"gait", "joints"}
 
 
@@ -212,7 +219,7 @@ def test_the_report_is_one_file_without_anything_from_outside(written: Path) -> 
     sources = re.findall(r'(?:src|href)="([^"]*)"', html)
     assert all(source.startswith(("data:image/png;base64,", "#")) for source in sources)
     assert "http" not in re.sub(r"base64,[A-Za-z0-9+/=]+", "", html).replace("http-equiv", "")
-    assert html.count("<figure>") == 7
+    assert html.count("<figure>") == len(set(plots.PLOTS) - WALKING)
     assert "FAIL" in html and "fell after" in html and "woke 25.0 ms late" in html
 
 
@@ -248,7 +255,10 @@ def test_a_run_ends_with_the_tick_of_its_last_state_and_the_truth_after_it() -> 
 
 
 def test_every_plot_lies_beside_the_report(written: Path) -> None:
-    assert {path.stem for path in (written / "plots").iterdir()} == {"summary_card", *plots.PLOTS}
+    assert {path.stem for path in (written / "plots").iterdir()} == {
+        "summary_card",
+        *(set(plots.PLOTS) - WALKING),
+    }
 
 
 def test_what_a_log_says_is_escaped(stand: Run) -> None:

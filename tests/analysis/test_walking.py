@@ -28,11 +28,11 @@ def test_every_swing_is_a_step_and_the_last_may_have_no_touchdown(walk: Run) -> 
     found = walking.steps(walk)
     assert [step.foot for step in found] == [0, 1] * 6
     assert [step.lift_off for step in found] == pytest.approx(1.05 + STEP_TIME * np.arange(12))
-    assert [step.touchdown for step in found] == pytest.approx(1.25 + STEP_TIME * np.arange(12))
-    assert [step.time for step in found] == pytest.approx([0.2] * 12)
+    assert [down.time for _, down in walking.landed(found)] == pytest.approx(1.25 + STEP_TIME * np.arange(12))
+    assert [down.swing_time for _, down in walking.landed(found)] == pytest.approx([0.2] * 12)
     assert [number for number, step in enumerate(found) if step.recovering] == [2, 5]
     early = walking.steps(walk.between(None, 3.9))[-1]
-    assert (early.touchdown, early.time, early.reached, early.error) == (None, None, None, None)
+    assert early.touchdown is None
 
 
 def test_a_swing_that_ends_in_standing_is_no_touchdown() -> None:
@@ -71,8 +71,8 @@ def test_the_estimates_drift_and_yaw_are_no_error_of_a_foothold() -> None:
         x, y = trace[name][..., 0].copy(), trace[name][..., 1].copy()
         trace[name][..., 0], trace[name][..., 1] = 7.0 - y, -3.0 + x
     messages["TRUTH"]["quat_WB"] = [1.0, 0.0, 0.0, 0.0]
-    for step in walking.steps(run_of(messages)):
-        assert step.error == pytest.approx((0.012, -0.005), abs=1e-9)
+    for _, down in walking.landed(walking.steps(run_of(messages))):
+        assert down.error == pytest.approx((0.012, -0.005), abs=1e-9)
 
 
 def test_without_the_truth_a_foothold_is_compared_with_the_estimates_feet() -> None:
@@ -80,7 +80,7 @@ def test_without_the_truth_a_foothold_is_compared_with_the_estimates_feet() -> N
     messages["TRUTH"]["p_WF"] += 99.0 * np.arange(8).reshape(1, 4, 2).sum(axis=2)[..., None]
     del messages["TRUTH"]
     run = run_of(messages)
-    assert walking.steps(run)[0].error == pytest.approx((0.012, -0.005), abs=1e-3)
+    assert walking.landed(walking.steps(run))[0][1].error == pytest.approx((0.012, -0.005), abs=1e-3)
     found = walking.walking(run)
     assert found is not None
     assert (found.slip, found.cost_of_transport) == (None, None)
