@@ -26,10 +26,27 @@ def configuration(run: Run) -> dict[str, Any]:
 
 def value(run: Run, path: str) -> Any:
     """What stands at a dotted path of the configuration, as controller.force_qp.friction; None where nothing does."""
-    found: Any = configuration(run)
+    return _at(configuration(run), path)
+
+
+def scenario_value(run: Run, path: str) -> Any:
+    """The same of the scenario as it was drawn, as sensors.noise."""
+    text = run.simulator.scenario if run.simulator is not None else ""
+    try:
+        return _at(yaml.safe_load(text), path)
+    except yaml.YAMLError:
+        return None
+
+
+def _at(found: Any, path: str) -> Any:
     for key in path.split("."):
         found = found.get(key) if isinstance(found, dict) else None
     return found
+
+
+def has_noisy_sensors(run: Run) -> bool:
+    """Whether the log says that the simulator's sensors had noise."""
+    return isinstance(scenario_value(run, "sensors.noise"), dict)
 
 
 def friction(run: Run, walking: bool = False) -> float | None:

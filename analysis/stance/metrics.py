@@ -92,6 +92,10 @@ class Timing:
     """Times [us] by the wall clock; what only real time has is None in lockstep."""
 
     stage_us: dict[str, Percentiles | None]
+    rest_us: Percentiles | None
+    """of a tick outside its stages: publishing above all"""
+    share: dict[str, float]
+    """of each stage, and of `rest`, in the time of all ticks together"""
     tick_us: Percentiles | None
     cpu_us: Percentiles | None
     wake_latency_us: Percentiles | None
@@ -399,8 +403,15 @@ def timing(run: Run) -> Timing | None:
     def real_time(values: Array) -> Percentiles | None:
         return None if lockstep else Percentiles.of(values)
 
+    parts = tick_parts(run)
+    total = parts.sum()
     return Timing(
         stage_us={name: Percentiles.of(stages[:, i]) for i, name in enumerate(STAGES)},
+        rest_us=Percentiles.of(parts[:, -1]),
+        share={
+            name: float(spent / total) if total > 0.0 else 0.0
+            for name, spent in zip((*STAGES, "rest"), parts.sum(axis=0), strict=True)
+        },
         tick_us=Percentiles.of(tick),
         cpu_us=Percentiles.of(run.field("CONTROLLER_TIMING", "cpu_us")),
         wake_latency_us=real_time(run.field("CONTROLLER_TIMING", "wake_latency_us")),
@@ -409,6 +420,12 @@ def timing(run: Run) -> Timing | None:
         slack_min_us=None if lockstep else float(run.field("CONTROLLER_TIMING", "slack_us").min()),
         period_us=nominal,
     )
+
+
+def tick_parts(run: Run) -> Floats:
+    """us, (n, stages + 1): of each tick its stages, and what they leave of it."""
+    stages, tick = (run.field("CONTROLLER_TIMING", name) for name in ("stage_us", "tick_us"))
+    return np.column_stack([stages, np.maximum(tick - stages.sum(axis=1), 0.0)])
 
 
 def force_qp(run: Run) -> ForceQp | None:

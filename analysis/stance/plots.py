@@ -124,9 +124,8 @@ def timing(run: Run) -> Figure:
     fig = new_figure(WIDTH, 8.2, "Tick period and time per stage", configuration.title(run))
     lockstep = metrics.is_lockstep(run)
     time = run.time("CONTROLLER_TIMING")
-    stage = run.field("CONTROLLER_TIMING", "stage_us")
+    stage = metrics.tick_parts(run)
     tick = run.field("CONTROLLER_TIMING", "tick_us")
-    stage = np.column_stack([stage, np.maximum(tick - stage.sum(axis=1), 0.0)])
     deadline = 1e6 * signals.period(run)
     axes = fig.subplot_mosaic(
         [["period", "period"], ["stages", "stages"], ["histogram", "tail"], ["bars", "tail"]],
@@ -255,7 +254,7 @@ def _stage_bars(ax: Axes, stage: Array) -> None:
         ax.plot([max(found.p99, 0.1)], [y], "|", color=style.INK, ms=9, mew=1.2)
         ax.plot([max(found.p99_9, 0.1)], [y], "|", color=style.MUTED, ms=9, mew=1.2)
         ax.annotate(
-            f"{found.p50:,.1f} / {found.p99:,.1f} / {found.max:,.0f}",
+            f"{found.p50:,.1f} / {found.p99:,.1f} / {found.p99_9:,.0f} / {found.max:,.0f}",
             (max(found.max, 0.1), y),
             xytext=(5, 0),
             textcoords="offset points",
@@ -266,10 +265,10 @@ def _stage_bars(ax: Axes, stage: Array) -> None:
     ax.set_yticks(range(len(PARTS)), PARTS[::-1])
     ax.set_xscale("log")
     low, high = ax.get_xlim()
-    ax.set_xlim(max(low, 0.05), high * 12)
+    ax.set_xlim(max(low, 0.05), high * 25)
     ax.set_ylim(-0.7, len(PARTS) - 0.3)
     ax.set_xlabel("time [µs]")
-    ax.set_title("Each stage: p50 / p99 / max [µs]")
+    ax.set_title("Each stage: p50 / p99 / p99.9 / max [µs]")
     ax.grid(axis="y", visible=False)
 
 

@@ -13,19 +13,22 @@ import jinja2
 from matplotlib.figure import Figure
 
 from . import __version__, configuration, plots, signals, style
-from .check import SHARE, Verdict, judge, limits_file, load_limits, quantity
+from .check import DIRECTORY, SHARE, Verdict, judge, limits_file, load_limits, quantity
 from .errors import StanceError
 from .log import Log
 from .messages import CONTROLLER_CHANNELS
 from .metrics import Metrics, Ticks, measure
 from .plain import to_json
 from .series import Run
-from .signals import Percentiles
+from .signals import Percentiles, Spread
 from .timeline import Event, timeline
+from .walking import Segment, Walking
 
+TAIL = ("p50", "p99", "p99.9", "max")
 SCHEMA = {"schema": "stance.summary", "version": 1}
 CARD = "summary_card"  # beside the report, not in it: its head and its verdict say the same
 MAX_EVENTS = 400  # rows of the report's table of events
+ESTIMATOR = DIRECTORY / "estimator.yaml"  # what is asked of it
 
 
 @dataclass(frozen=True)
@@ -36,6 +39,8 @@ class Analysis:
     metrics: Metrics
     verdict: Verdict
     events: list[Event]
+    estimator: Verdict | None = None
+    """its figures against what is asked of them on noisy sensors; None where the sensors had no noise"""
 
     def summary(self) -> dict[str, Any]:
         """What summary.json holds."""
@@ -52,6 +57,7 @@ class Analysis:
             },
             "verdict": self.verdict.as_dict(),
             "metrics": self.metrics.as_dict(),
+            "estimator_asked": None if self.estimator is None else self.estimator.as_dict(),
             "events": [asdict(event) for event in self.events],
         }
 
@@ -76,8 +82,12 @@ def analyse(log: Log, run_id: int | None = None, limits: Path | None = None) -> 
     measured = measure(run, log.report)
     info = run.controller or run.simulator
     chosen = limits or limits_file(info.robot if info else "", configuration.scenario_name(run))
-    verdict = judge(measured.as_dict(), load_limits(chosen), chosen.name)
-    return Analysis(run, measured, verdict, timeline(run))
+    figures = measured.as_dict()
+    verdict = judge(figures, load_limits(chosen), chosen.name)
+    asked = None
+    if measured.estimator is not None and configuration.has_noisy_sensors(run):
+        asked = judge(figures, load_limits(ESTIMATOR), ESTIMATOR.name)
+    return Analysis(run, measured, verdict, timeline(run), asked)
 
 
 def figures(analysis: Analysis) -> dict[str, Callable[[], Figure]]:
@@ -127,7 +137,7 @@ def render(analysis: Analysis, images: dict[str, bytes]) -> str:
         metrics=analysis.metrics,
         verdict=analysis.verdict,
         title=configuration.title(analysis.run),
-        tables=tables(analysis.metrics),
+        tables=tables(analysis.metrics, analysis.estimator),
         events=analysis.events[:MAX_EVENTS],
         hidden_events=max(len(analysis.events) - MAX_EVENTS, 0),
         images=embedded,
@@ -140,11 +150,24 @@ class Table:
     title: str
     head: list[str]
     rows: list[list[str]]
+    shares: list[float] | None = None
+    """of 1, a bar in each row"""
 
 
-def tables(metrics: Metrics) -> list[Table]:
-    """The metrics for people, in the order of the report."""
+def tables(metrics: Metrics, estimator: Verdict | None = None) -> list[Table]:
+    """The metrics for people, in the order of the report; `estimator`: its figures against what is asked of them."""
     found = [Table("Motion", ["figure", "value"], _motion(metrics))]
+    if metrics.walking is not None:
+        found.append(Table("Walking", ["figure", "value"], _walking(metrics.walking)))
+        head = ["command", "wanted", "walked", "straight way", "steps", "cost of transport"]
+        found.append(Table("Walking by command", head, [_segment(one) for one in metrics.segments]))
+    if estimator is not None:
+        marks = {True: "✓", False: "✗"}
+        rows = [
+            [f"{marks[one.passed] if one.value is not None else '·'} {one.limit.name}", one.measured, one.limit.rule]
+            for one in estimator.findings
+        ]
+        found.append(Table("Estimator on noisy sensors, rms", ["figure", "measured", "asked"], rows))
     if metrics.ticks is not None:
         found.append(Table("Ticks", ["figure", "value"], _ticks(metrics.ticks)))
     if metrics.timing is not None:
@@ -156,8 +179,11 @@ def tables(metrics: Metrics) -> list[Table]:
             _percentile_row("|period less nominal|", timing.period_jitter_us),
             _percentile_row("state's stamp to command", timing.state_to_command_us),
         ]
-        rows += [_percentile_row(f"stage {name}", found) for name, found in timing.stage_us.items()]
-        found.append(Table("Time [µs]", ["quantity", "p50", "p99", "p99.9", "max"], [row for row in rows if row]))
+        found.append(Table("Time [µs]", ["quantity", *TAIL], [row for row in rows if row]))
+        parts = {**timing.stage_us, "rest": timing.rest_us}
+        rows = [[*_percentile_row(name, parts[name]), quantity(share, SHARE)] for name, share in timing.share.items()]
+        head = ["stage", *TAIL, "of all ticks"]
+        found.append(Table("Where a tick's time goes [µs]", head, rows, list(timing.share.values())))
     if metrics.qp is not None:
         found.append(Table("Force QP", ["figure", "value"], _force_qp(metrics)))
     if metrics.joints is not None:
@@ -201,6 +227,53 @@ def _motion(metrics: Metrics) -> list[list[str]]:
     return [[name, quantity(value, unit)] for name, value, unit in rows if value is not None]
 
 
+def _walking(found: Walking) -> list[list[str]]:
+    def spread(of: Spread | None, unit: str) -> str | None:
+        if of is None:
+            return None
+        least, most = quantity(of.min, unit), quantity(of.max, unit)
+        return f"{quantity(of.mean, unit)} ± {quantity(of.std, unit)} ({least} to {most})"
+
+    def tail(of: Percentiles | None) -> str | None:
+        return None if of is None else " / ".join(quantity(value, "m") for value in (of.p50, of.p99, of.max))
+
+    got_over = ", ".join(
+        f"{count} of them {what}"
+        for count, what in ((found.recovering, "getting over a push"), (found.crossing, "crossing over"))
+        if count
+    )
+    cost = found.cost_of_transport
+    rows: list[tuple[str, str | None]] = [
+        ("steps", f"{found.steps}{', ' if got_over else ''}{got_over}"),
+        ("way", quantity(found.distance, "m")),
+        ("cost of transport, joints' |work| over weight and way", None if cost is None else quantity(cost, "")),
+        ("step time, mean ± std (range)", spread(found.step_time, "s")),
+        ("swing time", spread(found.swing_time, "s")),
+        ("swing time less planned at lift-off", spread(found.swing_time_change, "s")),
+        ("foothold reached less planned, forward", spread(found.foothold_forward, "m")),
+        ("the same, left", spread(found.foothold_left, "m")),
+        ("the same, length, p50 / p99 / max", tail(found.foothold_error)),
+        ("foothold's plan from lift-off to touchdown, p50 / p99 / max", tail(found.foothold_change)),
+        ("swing foot from its reference, p50 / p99 / max", tail(found.swing_error)),
+        ("slip of a stance, true, p50 / p99 / max", tail(found.slip)),
+    ]
+    return [[name, value] for name, value in rows if value is not None]
+
+
+def _segment(one: Segment) -> list[str]:
+    def motion(velocity: tuple[float, float], yaw_rate: float) -> str:
+        return f"({velocity[0]:+.2f}, {velocity[1]:+.2f}) m/s, {yaw_rate:+.2f} rad/s".replace("-", style.MINUS)
+
+    return [
+        f"{one.start:.2f} to {one.end:.2f} s, {one.behaviour.replace('_', ' ')}",
+        motion(one.wanted_velocity, one.wanted_yaw_rate),
+        motion(one.velocity, one.yaw_rate),
+        quantity(one.distance, "m"),
+        f"{one.steps}",
+        "-" if one.cost_of_transport is None else quantity(one.cost_of_transport, ""),
+    ]
+
+
 def _ticks(ticks: Ticks) -> list[list[str]]:
     return [
         ["ticks", f"{ticks.count}"],
@@ -216,16 +289,13 @@ def _force_qp(metrics: Metrics) -> list[list[str]]:
     qp = metrics.qp
     rows = [[f"ticks {name.replace('_', ' ')}", f"{count}"] for name, count in qp.status.items()]
     if qp.iterations is not None:
-        rows.append(["iterations, p50 / p99 / max", " / ".join(f"{value:.0f}" for value in _three(qp.iterations))])
+        iterations = asdict(qp.iterations).values()
+        rows.append(["iterations, p50 / p99 / p99.9 / max", " / ".join(f"{value:.0f}" for value in iterations)])
     rows.append(["primal residual, largest", f"{qp.primal_residual_max:.2e} N"])
     rows.append(["dual residual, largest", f"{qp.dual_residual_max:.2e} N"])
     rows.append(["active constraints, most", f"{qp.active_max}"])
     rows.append(["effort ‖f‖_R, mean / largest", f"{qp.effort_mean:.2f} / {qp.effort_max:.2f}"])
     return rows
-
-
-def _three(found: Percentiles) -> tuple[float, float, float]:
-    return found.p50, found.p99, found.max
 
 
 def _percentile_row(name: str, found: Percentiles | None) -> list[str]:

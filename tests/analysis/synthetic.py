@@ -168,6 +168,8 @@ class Synthetic:
     estimator_drift: float = 0.0
     """m/s, along x"""
     walk: Walk | None = None
+    scenario: str = "scenario: demo\n"
+    """the simulator's, as it was drawn"""
 
     def messages(self) -> dict[str, npt.NDArray[np.void]]:
         """channel → encoded messages, in order."""
@@ -319,7 +321,7 @@ class Synthetic:
         if program != "stance-controller":  # which serves any run
             message.utime, message.seq, message.run_id, message.seed = utime, seq, self.run_id, self.seed
         message.program, message.version, message.source, message.build = program, "0.1.0", "0123abc", "g++ 12 Release"
-        message.robot, message.scenario = "biped", "scenario: demo\n"
+        message.robot, message.scenario = "biped", self.scenario
         message.options = f"--robot biped --scenario demo {'--realtime' if self.realtime else '--lockstep'}"
         message.urdf, message.configuration, message.input_hash = URDF, CONFIGURATION, "00c0ffee"
         message.tag = bytes(16)

@@ -187,6 +187,10 @@ def test_lockstep_has_stage_times_but_no_latency() -> None:
     assert found is not None
     assert found.tick_us is not None and found.tick_us.max == N - 1
     assert found.stage_us["force_qp"] == Percentiles(7.0, 7.0, 7.0, 7.0)
+    assert found.rest_us is not None and found.rest_us.max == N - 1 - 7.0
+    assert sum(found.share.values()) == pytest.approx(1.0)
+    parts = 7.0 * N + sum(max(k - 7.0, 0.0) for k in range(N))
+    assert (found.share["force_qp"], found.share["plan"]) == pytest.approx((7.0 * N / parts, 0.0))
     assert found.wake_latency_us is None and found.period_jitter_us is None and found.state_to_command_us is None
 
 

@@ -17,7 +17,7 @@ from stance import plots, style
 from stance.errors import StanceError, UnreadableError
 from stance.log import Log
 from stance.messages import CONTROLLER_CHANNELS
-from stance.metrics import measure
+from stance.metrics import STAGES, measure
 from stance.picture import picture, pose_at
 from stance.report import MAX_EVENTS, analyse, figures, render, write, write_plots
 from stance.series import Run
@@ -221,6 +221,64 @@ def test_the_report_is_one_file_without_anything_from_outside(written: Path) -> 
     assert "http" not in re.sub(r"base64,[A-Za-z0-9+/=]+", "", html).replace("http-equiv", "")
     assert html.count("<figure>") == len(set(plots.PLOTS) - WALKING)
     assert "FAIL" in html and "fell after" in html and "woke 25.0 ms late" in html
+
+
+def rows_of(html: str, title: str) -> dict[str, list[str]]:
+    """A table of the report: its first cell → the others."""
+    table = html.split(f"<h3>{title}</h3>")[1].split("</table>")[0]
+    rows = [re.findall(r"<td[^>]*>(?:<div[^>]*></div>)?([^<]*)</td>", row) for row in table.split("</tr>")]
+    return {cells[0]: cells[1:] for cells in rows if cells}
+
+
+def test_the_report_says_where_a_ticks_time_goes(written: Path) -> None:
+    html = (written / "report.html").read_text()
+    timing = json.loads((written / "summary.json").read_text())["metrics"]["timing"]
+    stages = rows_of(html, "Where a tick&#39;s time goes [µs]")
+    assert list(stages) == [*STAGES, "rest"]
+    qp = timing["stage_us"]["force_qp"]
+    assert stages["force_qp"][:4] == [f"{qp[key]:,.1f}" for key in ("p50", "p99", "p99_9", "max")]
+    share = 100 * timing["share"]["force_qp"]
+    assert stages["force_qp"][4] == f"{share:.3g} %"
+    assert 60.0 < share < 80.0
+    assert f'<div style="width: {share:.1f}%"></div>' in html
+    cpu = timing["cpu_us"]
+    assert rows_of(html, "Time [µs]")["CPU time of the tick"][0] == f"{cpu['p50']:,.1f}"
+    assert rows_of(html, "Force QP")["iterations, p50 / p99 / p99.9 / max"] == ["50 / 75 / 75 / 75"]
+
+
+def test_the_report_tells_how_the_robot_walked_and_what_came_of_each_command(tmp_path: Path) -> None:
+    synthetic = Synthetic(duration=4.0, pushes=[], walk=Walk(start=1.0, speed=0.4, recovering=(2,)))
+    analysis = analyse(Log.from_bytes(synthetic.log()))
+    html = render(analysis, {})
+    told = rows_of(html, "Walking")
+    assert told["steps"] == ["12, 1 of them getting over a push"]
+    assert told["swing time"][0].startswith("0.2 s ± ")
+    assert told["foothold reached less planned, forward"] == ["12 mm ± 0 mm (12 mm to 12 mm)"]
+    assert told["swing foot from its reference, p50 / p99 / max"] == ["4 mm / 4 mm / 4 mm"]
+    commands = rows_of(html, "Walking by command")
+    walked = commands["1.00 to 4.00 s, walk"]
+    assert walked[0] == "(+0.40, +0.00) m/s, +0.00 rad/s"
+    assert walked[1].startswith("(+0.40, ") and walked[3] == "12"
+    summary = analysis.summary()["metrics"]
+    assert summary["walking"]["steps"] == 12
+    assert summary["segments"][1]["wanted_velocity"] == (0.4, 0.0)
+    assert "<h3>Walking</h3>" not in render(analyse(Log.from_bytes(Synthetic(duration=0.5).log())), {})
+
+
+def test_the_estimators_figures_are_held_against_what_is_asked_where_the_sensors_had_noise() -> None:
+    noisy = "sensors: {noise: {gyro_white: 0.003}}\n"
+    analysis = analyse(Log.from_bytes(Synthetic(duration=1.0, pushes=[], scenario=noisy).log()))
+    told = rows_of(render(analysis, {}), "Estimator on noisy sensors, rms")
+    assert told["✓ roll"] == ["0 mrad", "≤ 6 mrad"]
+    measured = analysis.metrics.estimator
+    assert measured is not None and measured.nees is not None and measured.nees > 0.4
+    assert told["✓ NEES at least"] == [f"{measured.nees:.3g}", "≥ 0.4"]
+    assert told["· velocity while walking"][0] == "not in the log"
+    asked = analysis.summary()["estimator_asked"]
+    assert asked is not None and asked["limits"] == "estimator.yaml" and asked["passed"]
+    assert analysis.verdict.source == "biped_demo.yaml"
+    calm = analyse(Log.from_bytes(Synthetic(duration=0.5, scenario="sensors: {noise: none}\n").log()))
+    assert calm.summary()["estimator_asked"] is None
 
 
 def test_the_summary_is_versioned_and_holds_figures_verdict_and_events(written: Path) -> None:
