@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import re
 import warnings
@@ -13,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
+from PIL import Image
 from stance import plots, style
 from stance.errors import StanceError, UnreadableError
 from stance.log import Log
@@ -122,6 +124,15 @@ def test_a_calm_run_is_not_magnified() -> None:
 def test_the_same_run_gives_the_same_picture_byte_for_byte(stand: Run) -> None:
     for kind in ("png", "svg"):
         assert style.render(plots.gait(stand), kind, 40) == style.render(plots.gait(stand), kind, 40)
+
+
+def test_a_png_keeps_its_paper_white_and_its_ink_dark_in_few_colours(stand: Run) -> None:
+    with Image.open(io.BytesIO(style.render(plots.forces(stand)))) as image:
+        assert image.mode == "P"
+        pixels = np.asarray(image.convert("RGB")).astype(int)
+    assert (pixels[2, 2] == 255).all()
+    ink = np.array([int(style.INK[i : i + 2], 16) for i in (1, 3, 5)])
+    assert np.abs(pixels - ink).sum(axis=-1).min() < 24
 
 
 def test_plots_leave_matplotlibs_settings_alone(stand: Run) -> None:
