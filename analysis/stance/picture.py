@@ -59,7 +59,7 @@ class Pose:
     """that the controller plans with; None where the log does not say"""
 
 
-def _whole(run: Run) -> Integers:
+def whole_rows(run: Run) -> Integers:
     """Rows of TRUTH whose pose and forces are all finite: those that can be drawn."""
     if "TRUTH" not in run:
         return np.empty(0, np.int64)
@@ -70,12 +70,12 @@ def _whole(run: Run) -> Integers:
 
 def drawable(run: Run) -> bool:
     """Whether the log has a TRUTH to draw, and the body's URDF."""
-    return len(_whole(run)) > 0 and configuration.robot(run) is not None
+    return len(whole_rows(run)) > 0 and configuration.robot(run) is not None
 
 
 def pose_at(run: Run, time: float) -> Pose:
     """The logged instant nearest to `time` [s] that is finite. Raises UnreadableError where there is none."""
-    rows = _whole(run)
+    rows = whole_rows(run)
     if not len(rows):
         raise UnreadableError("no TRUTH in the log: the robot cannot be drawn")
     row = int(rows[np.argmin(np.abs(run.time("TRUTH")[rows] - time))])
@@ -183,7 +183,7 @@ def _instants_of(run: Run, push: Push) -> list[float]:
     """Before a push, within it, at its end, at the largest tilt after it, and back again [s]; a fall ends them."""
     time = run.time("TRUTH")
     end = push.start + push.duration
-    rows = _whole(run)
+    rows = whole_rows(run)
     after = rows[(time[rows] >= end + MIN_STEP) & (time[rows] <= end + 1.0)]
     wanted = [push.start - 0.02, push.start + 0.5 * push.duration, end]
     if len(after):
@@ -196,10 +196,10 @@ def _instants_of(run: Run, push: Push) -> list[float]:
 def _top(body: Robot, pose: Pose) -> float:
     """m, the highest point of the trunk over the ground."""
     boxes = [shape for shape in body.links[body.root].visual if shape.kind == "box"]
-    return max((float(_corners(pose.T_WB @ shape.T_link, shape)[:, 2].max()) for shape in boxes), default=0.0)
+    return max((float(box_corners(pose.T_WB @ shape.T_link, shape)[:, 2].max()) for shape in boxes), default=0.0)
 
 
-def _corners(T: Array, box: Shape) -> Array:
+def box_corners(T: Array, box: Shape) -> Array:
     """m, (8, 3), of a box whose frame is T."""
     corners = np.array(np.meshgrid(*[[-0.5 * size, 0.5 * size] for size in box.size])).reshape(3, -1)
     return np.asarray((T[:3, :3] @ corners + T[:3, 3:]).T)
@@ -306,7 +306,7 @@ def _link_colour(side: int | None, behind: bool) -> str:
 
 def _shape(ax: Axes, T: Array, shape: Shape, plane: Array, colour: str, alpha: float, order: int) -> None:
     if shape.kind == "box":
-        points = _corners(T, shape) @ plane.T
+        points = box_corners(T, shape) @ plane.T
         outline = points[ConvexHull(points).vertices]
         ax.add_patch(Polygon(outline, closed=True, fc=colour, ec=LINK_COLOUR, lw=1.2, alpha=alpha, zorder=order + 1))
     elif shape.kind == "cylinder":

@@ -21,6 +21,7 @@ from .plain import counted
 from .series import Array, Floats, Run
 from .signals import Percentiles
 from .style import new_figure, shade, stance_bars, styled, time_axis
+from .walk_picture import walk, walks
 
 WIDTH = 11.0  # inch
 PARTS = (*metrics.STAGES, "publish, rest")  # of a tick: its stages, and what they leave of it
@@ -560,6 +561,7 @@ def _has_landed(run: Run) -> bool:
 
 PLOTS = {
     "picture": Plot("The robot", picture, drawable),
+    "walk": Plot("The walk from the side", walk, walks),
     "timing": Plot("Tick period and stage times", timing, lambda run: "CONTROLLER_TIMING" in run),
     "center_of_mass": Plot("Centre of mass and base", center_of_mass, lambda run: "CONTROLLER_TRACE" in run),
     "forces": Plot(

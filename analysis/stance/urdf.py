@@ -116,6 +116,11 @@ class Robot:
         ]
 
 
+def foot_radius(body: Robot, link: str) -> float:
+    """m, of the ball that a foot's link ends in, as `Robot.feet` has them."""
+    return next(shape.size[0] for shape in body.links[link].collision if shape.kind == "sphere")
+
+
 def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Floats:
     """R = Rz(yaw) Ry(pitch) Rx(roll), (3, 3); angles in rad."""
     return np.asarray(Rotation.from_euler("ZYX", [yaw, pitch, roll]).as_matrix())

@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 from . import configuration, signals
 from .series import Array, Floats, Run
 from .signals import BEHAVIOURS, SINGLE_SUPPORT, STANDING, Percentiles, Spread
-from .urdf import rotation_from_quaternion, transform
+from .urdf import foot_radius, rotation_from_quaternion, transform
 
 SETTLING = 3.0  # s of a segment that its means leave out, at most; as rollout/summary.cpp
 MIN_PATH = 1.0  # m, below it no cost is a cost of transport
@@ -217,10 +217,9 @@ def slip(run: Run) -> tuple[Floats, Floats] | None:
     )
     moved = np.full(loaded.shape, np.nan)
     for foot, (link, _) in enumerate(tips):
-        radius = next(shape.size[0] for shape in body.links[link].collision if shape.kind == "sphere")
         R = Rotation.from_matrix(frames[link][:, :3, :3])
         turned = (R[1:] * R[:-1].inv()).as_rotvec()
-        rolled = radius * np.column_stack([turned[:, 1], -turned[:, 0]])  # dtheta x z
+        rolled = foot_radius(body, link) * np.column_stack([turned[:, 1], -turned[:, 0]])  # dtheta x z
         slid = np.diff(run.field("TRUTH", "p_WF")[:, foot, :2], axis=0) - rolled
         way = np.concatenate([np.zeros((1, 2)), np.cumsum(slid, axis=0)])
         for first, last in signals.intervals(loaded[:, foot]):

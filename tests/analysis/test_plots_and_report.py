@@ -38,7 +38,7 @@ def without_truth() -> Run:
     return run_of({name: values for name, values in Synthetic(duration=0.5).messages().items() if name != "TRUTH"})
 
 
-WALKING = {"footholds", "swing"}
+WALKING = {"walk", "footholds", "swing"}
 """plots that need steps"""
 
 RENDERED = (
