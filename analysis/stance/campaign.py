@@ -28,7 +28,7 @@ import subprocess
 import tempfile
 import threading
 from collections import Counter
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
@@ -37,12 +37,15 @@ from pathlib import Path
 from statistics import median
 from typing import IO, Any
 
+import yaml
+
 from . import configuration, estimation, metrics, signals, walking
 from .check import Finding, Limit, figure, judge, quantity
 from .errors import RunError, StanceError
 from .log import Log
 from .plain import counted, to_json
 from .programs import find_program, mortal, share_directory
+from .pushes import PushTrial, drawn_scenario, has_one_push, push_of
 from .study import Cell, Study
 from .tick_cpu import TickCpu, merge
 
@@ -125,6 +128,8 @@ class Tally:
     """None where the cell that it is compared with did not run"""
     figures: list[Figure]
     failures: list[Failure]
+    pushes: list[PushTrial] = field(default_factory=list)
+    """every trial, where the scenario has exactly one push"""
 
 
 @dataclass(frozen=True)
@@ -463,6 +468,7 @@ class _Campaign:
             met=_met(cell, rates),
             figures=_figures(cell, [trial for trial in trials if not trial.rollout["fallen"]]),
             failures=failures,
+            pushes=_pushes(cell, trials, {failure.seed for failure in failures}),
         )
 
     # ---- where things are
@@ -594,6 +600,17 @@ def _why(cell: Cell, trial: _Trial) -> list[str]:
         f"{finding.limit.name} {finding.measured}, not {finding.limit.rule}"
         for one in judged
         for finding in one.violated
+    ]
+
+
+def _pushes(cell: Cell, trials: Sequence[_Trial], failed: Collection[int]) -> list[PushTrial]:
+    """What each trial was pushed with."""
+    scenario = yaml.safe_load(cell.scenario)
+    if not has_one_push(scenario):
+        return []
+    return [
+        PushTrial(trial.seed, *push_of(drawn_scenario(scenario, trial.rollout["drawn"])), trial.seed not in failed)
+        for trial in trials
     ]
 
 

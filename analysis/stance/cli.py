@@ -210,20 +210,31 @@ def _export(options: argparse.Namespace) -> int:
 
 
 def _campaign(options: argparse.Namespace) -> int:
+    import yaml
+
     from .campaign import Request, as_text, run_campaign
+    from .push_map import panels, push_map
+    from .pushes import has_one_push
     from .run import progress_bar
     from .scoreboard import around, insert, keep, load, table
     from .study import load_study
+    from .style import render
 
     if options.summary and options.name:
         raise StanceError("--summary keeps whole studies: leave out --name")
     if options.table and not options.summary:
         raise StanceError("--table is drawn from --summary: give both")
+    if options.map and len(options.study) > 1:
+        raise StanceError(f"--map draws one study: leave out all of {', '.join(options.study)} but one")
+    if options.map and options.map.suffix not in (".png", ".svg", ".pdf"):
+        raise StanceError(f"--map: {options.map} must end in .png, .svg or .pdf")
     if options.summary and options.summary.exists():
         load(options.summary)  # files that cannot be used are told before the campaign, not after it
     if options.table:
         around(options.table)
     studies = [load_study(study, options.robot) for study in options.study]
+    if options.map and not any(has_one_push(yaml.safe_load(cell.scenario)) for cell in studies[0].cells):
+        raise StanceError(f"--map: no scenario of {studies[0].name} has exactly one push")
     request = Request(
         output=options.output,
         trials=options.trials,
@@ -242,6 +253,11 @@ def _campaign(options: argparse.Namespace) -> int:
             _say(options, "what is done stays done: the same command goes on from there")
             raise
         outcomes.append(outcome)
+        if options.map:
+            shown = panels([(cell.name, cell.pushes) for cell in outcome.cells])
+            drawn = push_map(shown, outcome.title, f"{outcome.study}, seeds from {outcome.seed}")
+            options.map.write_bytes(render(drawn, options.map.suffix.removeprefix(".")))
+            _say(options, f"map: {options.map}")
         if options.summary:
             kept = keep(options.summary, [outcome])
             if options.table:
@@ -421,6 +437,9 @@ def _parser() -> argparse.ArgumentParser:
         "--output", type=Path, metavar="DIR", default=Path("runs/campaigns"), help="where to (default: runs/campaigns)"
     )
     campaign.add_argument("--summary", type=Path, metavar="FILE", help="keep what came of it in this JSON file, too")
+    campaign.add_argument(
+        "--map", type=Path, metavar="FILE", help="draw success by the push's direction and impulse: .png, .svg or .pdf"
+    )
     campaign.add_argument("--table", type=Path, metavar="FILE", help="and draw it between this Markdown file's marks")
 
     command = add("command", _command, "Commands a robot ten times a second until Ctrl-C, and then to stand.")

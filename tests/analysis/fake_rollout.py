@@ -33,7 +33,10 @@ def main() -> int:
         return 2
     if seed >= int(os.environ.get(HANG, sys.maxsize)):
         time.sleep(600.0)
-    impulse = math.hypot(*(sum(push["force_W"][i] * push["duration"] for push in scenario["pushes"]) for i in (0, 1)))
+    impulse = sum(
+        push.get("impulse", math.hypot(*push.get("force_W", (0.0,))[:2]) * push["duration"])
+        for push in scenario["pushes"]
+    )
     fallen = impulse > TOUGH
     if "--log" in option:
         from synthetic import Synthetic  # not before it is needed: it takes longer than all else here

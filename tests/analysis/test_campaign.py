@@ -327,6 +327,37 @@ def test_two_campaigns_do_not_write_to_one_place(bench: Bench) -> None:
         process.wait()
 
 
+def test_each_trial_tells_its_push_and_whether_it_succeeded(bench: Bench) -> None:
+    drawn = STUDY.replace("force_W: [$force, 0, 0]", "impulse: 2, direction: {uniform: [-3, 3]}")
+    ten, _, eighty = bench.run(drawn, trials=2).cells
+    assert [(one.seed, one.impulse, one.direction, one.succeeded) for one in ten.pushes] == [
+        (1, 2.0, 0.25, True),
+        (2, 2.0, 0.25, True),
+    ]
+    assert [(one.impulse, one.succeeded) for one in eighty.pushes] == [(pytest.approx(8.0), False)] * 2
+    twice = drawn.replace(
+        "pushes: [{", "pushes: [{time: 4.0, duration: 0.1, impulse: 1, direction: 0, point_B: [0, 0, 0]}, {", 1
+    )
+    assert bench.run(twice, trials=1).cells[0].pushes == []
+
+
+def test_the_command_draws_a_map_of_one_study(bench: Bench, capsys: pytest.CaptureFixture[str]) -> None:
+    words = bench.command("--trials", "1")[3:]
+    place = bench.directory / "map.svg"
+    assert main([*words, "--map", str(place)]) == 1
+    assert "<svg" in place.read_text()
+    assert f"map: {place}" in capsys.readouterr().err
+    calls = bench.calls()
+    for more, message in (
+        (["--study", str(bench.study), "stand", "--map", str(place)], "--map draws one study: leave out all of"),
+        (["--map", str(bench.directory / "map.txt")], "must end in .png, .svg or .pdf"),
+        (["--study", "stand", "--map", str(place)], "--map: no scenario of stand has exactly one push"),
+    ):
+        assert main([*words, *more]) == 2
+        assert message in capsys.readouterr().err
+    assert bench.calls() == calls
+
+
 def test_the_command_prints_and_ends_by_whether_what_is_asked_is_met(
     bench: Bench, capsys: pytest.CaptureFixture[str]
 ) -> None:
