@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import subprocess
 from pathlib import Path
 
@@ -10,7 +11,7 @@ import pytest
 from stance.campaign import Outcome, Request, run_campaign
 from stance.errors import RunError
 from stance.log import Log
-from stance.metrics import fall
+from stance.metrics import fall, pushes
 from stance.programs import find_program
 from stance.study import load_study
 
@@ -21,7 +22,11 @@ scenario: stand_noisy
 trials: 2
 set:
   duration: 4.0
-  pushes: [{time: {uniform: [1.0, 2.0]}, duration: 0.1, force_W: [500, 0, 0], point_B: [0, 0, 0]}]
+  pushes:
+    - time: {uniform: [1.0, 2.0]}
+      duration: 0.1
+      force_W: {choice: [[500, 0, 0], [{uniform: [-500, -490]}, 0, 0], [0, 500, 0], [0, {uniform: [-500, -490]}, 0]]}
+      point_B: [0, 0, 0]
 cells:
   - {name: struck}
 """
@@ -49,6 +54,17 @@ def test_a_kept_log_shows_the_fall_that_was_counted(struck: Outcome) -> None:
     assert cell.failures[0].drawn != cell.failures[1].drawn
 
 
+def test_what_a_trial_was_pushed_with_is_what_its_log_shows(struck: Outcome) -> None:
+    (cell,) = struck.cells
+    for told, failure in zip(cell.pushes, cell.failures, strict=True):
+        (push,) = pushes(Log.open(failure.log or "").run())
+        x, y, _ = push.impulse_W
+        assert (told.seed, told.succeeded) == (failure.seed, False)
+        assert told.direction == pytest.approx(math.atan2(y, x), abs=1e-6)
+        assert push.duration < 0.1 or told.impulse == pytest.approx(math.hypot(x, y))
+    assert cell.pushes[0].direction != cell.pushes[1].direction
+
+
 def test_the_command_of_a_failure_writes_the_same_log_again(struck: Outcome) -> None:
     failure = struck.cells[0].failures[1]
     log = Path(failure.log or "")
@@ -67,6 +83,6 @@ def test_the_controller_decides_every_byte_of_a_kept_log_again(struck: Outcome) 
 
 def test_a_key_that_no_scenario_has_is_told_with_its_cell(tmp_path: Path) -> None:
     study = tmp_path / "struck.yaml"
-    study.write_text(STUDY.replace("  duration:", "  frictoin: 0.5\n  duration:"))
+    study.write_text(STUDY.replace("  duration: 4.0", "  frictoin: 0.5\n  duration: 4.0"))
     with pytest.raises(RunError, match=r"cell 'struck', seed [12]: stance-rollout: struck-\w+\.yaml: .*frictoin"):
         run_campaign(load_study(str(study), "biped"), Request(tmp_path / "out"))
