@@ -5,9 +5,10 @@
     run = Log.open("run.lcmlog").run()
     measure(run).trunk.tilt_max_deg
 
-Modules: `log` reads, `series` holds, `signals`, `metrics` and `estimation` measure, `check` judges, `plots` and
-`picture` draw, `report` writes; `study` asks, `campaign` runs and counts, `tick_cpu` adds up, `scoreboard` keeps;
-`run`, `replay`, `command` and `network` speak LCM; `cli` is the command `stance`.
+Modules: `log` reads, `series` holds; `signals`, `metrics`, `estimation` and `walking` measure, `check` judges; `plots`,
+`gait_plots`, `picture`, `walk_picture` and `push_map` draw, `report` writes; `study` asks, `campaign` runs and counts,
+`pushes` and `tick_cpu` tell what its trials had in common, `scoreboard` keeps; `run`, `replay`, `command` and `network`
+speak LCM; `cli` is the command `stance`.
 """
 
 from importlib.metadata import version
