@@ -24,6 +24,7 @@ from .style import new_figure, shade, stance_bars, styled, time_axis
 from .walk_picture import walk, walks
 
 WIDTH = 11.0  # inch
+FAR = 1.0  # m, a way that is not drawn in mm any more
 PARTS = (*metrics.STAGES, "publish, rest")  # of a tick: its stages, and what they leave of it
 TAIL = ((0.5, "p50"), (0.01, "p99"), (0.001, "p99.9"))  # share of ticks above → name
 
@@ -283,18 +284,20 @@ def center_of_mass(run: Run) -> Figure:
     truth_time = run.time("TRUTH") if "TRUTH" in run else None
     for row, name in enumerate("xyz"):
         ax = axes[row, 0]
+        place = x[:, 3 + row]
+        scale, unit = (1.0, "m") if float(np.ptp(place)) > FAR else (1000.0, "mm")  # nan is not far
         if truth_time is not None:
-            ax.plot(truth_time, 1000 * run.field("TRUTH", "p_WC")[:, row], color=style.TRUTH, lw=1.8, label="true")
-        ax.plot(time, 1000 * x[:, 3 + row], color=style.ESTIMATE, lw=0.9, label="estimated")
-        ax.plot(time, 1000 * reference[:, 3 + row], color=style.REFERENCE, lw=1.0, ls=(0, (5, 2)), label="reference")
-        ax.set_ylabel(f"{name} [mm]")
-        style.at_least(ax, 4.0)
+            ax.plot(truth_time, scale * run.field("TRUTH", "p_WC")[:, row], color=style.TRUTH, lw=1.8, label="true")
+        ax.plot(time, scale * place, color=style.ESTIMATE, lw=0.9, label="estimated")
+        ax.plot(time, scale * reference[:, 3 + row], color=style.REFERENCE, lw=1.0, ls=(0, (5, 2)), label="reference")
+        ax.set_ylabel(f"{name} [{unit}]")
+        style.at_least(ax, 0.004 * scale)
     axes[0, 0].set_title("Centre of mass $p_{WC}$")
     for row, angle in enumerate(("roll", "pitch", "yaw")):
         ax = axes[row, 1]
         if truth_time is not None:
-            true = np.degrees(signals.roll_pitch_yaw(run.field("TRUTH", "quat_WB"))[:, row])
-            ax.plot(truth_time, true, color=style.TRUTH, lw=1.8)
+            true = np.unwrap(signals.roll_pitch_yaw(run.field("TRUTH", "quat_WB"))[:, row])
+            ax.plot(truth_time, np.degrees(true), color=style.TRUTH, lw=1.8)
         ax.plot(time, np.degrees(x[:, row]), color=style.ESTIMATE, lw=0.9)
         ax.plot(time, np.degrees(reference[:, row]), color=style.REFERENCE, lw=1.0, ls=(0, (5, 2)))
         ax.set_ylabel(f"{angle} [°]")
@@ -302,6 +305,7 @@ def center_of_mass(run: Run) -> Figure:
     axes[0, 1].set_title("Trunk's orientation")
     for column in range(2):
         shade(list(axes[:, column]), run, label=column == 0)
+        stance_bars(axes[2, column], run)
         time_axis(list(axes[:, column]), run)
     axes[0, 1].legend(*axes[0, 0].get_legend_handles_labels(), loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
     return fig

@@ -113,6 +113,17 @@ def test_a_planned_force_is_drawn_over_the_period_that_it_is_for_as_the_true_one
     assert (true.get_label(), true.get_drawstyle()) == ("true", "steps-pre")
 
 
+def test_a_long_way_is_in_metres_and_a_whole_turn_is_one_line() -> None:
+    messages = Synthetic(duration=2.0, pushes=[]).messages()
+    yaw = np.linspace(0.0, 3.0 * np.pi, 201)
+    messages["TRUTH"]["quat_WB"] = np.stack([np.cos(yaw / 2), 0.0 * yaw, 0.0 * yaw, np.sin(yaw / 2)], axis=1)
+    messages["TRUTH"]["p_WC"][:, 0] = messages["CONTROLLER_TRACE"]["x"][:, 3] = np.linspace(0.0, 2.5, 201)
+    axes = {ax.get_ylabel(): ax for ax in plots.center_of_mass(run_of(messages)).axes}
+    assert axes["x [m]"].lines[0].get_ydata()[-1] == pytest.approx(2.5)
+    assert "y [mm]" in axes
+    assert axes["yaw [°]"].lines[0].get_ydata() == pytest.approx(np.degrees(yaw))
+
+
 def test_a_calm_run_is_not_magnified() -> None:
     messages = Synthetic(duration=0.5, pushes=[]).messages()
     messages["TRUTH"]["f_F_W"][..., 1] = 1e-8 * np.sin(np.arange(51))[:, None]
