@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
 
 from . import configuration, signals, style, walking
@@ -258,6 +260,12 @@ def footholds(run: Run) -> Figure:
     return fig
 
 
+def _bundle(ax: Axes, lines: list[Floats], colour: str, dashes: Any, order: int) -> None:
+    """Many lines (points, 2) of one look, pale enough that what they share stands out."""
+    ax.add_collection(LineCollection(lines, colors=colour, lw=0.8, ls=dashes, alpha=0.4, zorder=order))
+    ax.autoscale_view()
+
+
 @styled
 def swing(run: Run) -> Figure:
     """9: how the swing feet follow their references, where they come down, and whether standing feet slide."""
@@ -272,20 +280,17 @@ def swing(run: Run) -> Figure:
     error = 1000 * signals.in_heading(walking.swing_error(run), yaw)
     tips, reference = run.field("CONTROLLER_TRACE", "p_WF"), run.field("CONTROLLER_TRACE", "swing_p")
     time = run.time("CONTROLLER_TRACE")
-    for step in made:
-        rows = slice(step.rows[0], step.rows[1] + 1)
-        support = tips[rows, 1 - step.foot]
-        ax = axes[f"path{step.foot}"]
+    for foot in (0, 1):
+        swings = [slice(step.rows[0], step.rows[1] + 1) for step in made if step.foot == foot]
         for place, colour, dashes, order in (
-            (tips[rows, step.foot], style.FEET[step.foot], "-", 2),
-            (reference[rows], style.REFERENCE, (0, (5, 2)), 3),
+            (tips[:, foot], style.FEET[foot], "-", 2),
+            (reference, style.REFERENCE, (0, (5, 2)), 3),
         ):
-            way = 1000 * signals.in_heading(place - support, yaw[rows])
-            ax.plot(way[:, 0], way[:, 2], color=colour, lw=0.8, ls=dashes, alpha=0.4, zorder=order)
+            way = 1000 * signals.in_heading(place - tips[:, 1 - foot], yaw)[:, [0, 2]]
+            _bundle(axes[f"path{foot}"], [way[rows] for rows in swings], colour, dashes, order)
         for axis, colour in enumerate(style.SERIES[:3]):
-            axes[f"error{step.foot}"].plot(
-                1000 * (time[rows] - step.lift_off), error[rows, axis], color=colour, lw=0.8, alpha=0.4
-            )
+            lines = [np.column_stack([1000 * (time[rows] - time[rows][0]), error[rows, axis]]) for rows in swings]
+            _bundle(axes[f"error{foot}"], lines, colour, "-", 2)
     for foot, name in enumerate(names):
         ax = axes[f"path{foot}"]
         ax.set_title(f"{name.capitalize()} foot's swings from the side")

@@ -133,63 +133,70 @@ def steps(run: Run) -> list[Step]:
     if "CONTROLLER_TRACE" not in run or signals.num_contacts(run) != 2:
         return []
     time = run.time("CONTROLLER_TRACE")
-
-    def field(name: str) -> Array:
-        return run.field("CONTROLLER_TRACE", name)
-
-    swings = field("gait_phase") == SINGLE_SUPPORT
-    count, foot, feet = field("steps"), field("swing_foot"), field("p_WF")
+    names = ("steps", "swing_foot", "p_WF", "foothold", "swing_time", "recovering", "crossing")
+    count, foot, feet, foothold, swing_time, recovering, crossing = (
+        run.field("CONTROLLER_TRACE", name) for name in names
+    )
     # Two swings with no tick between them are two all the same.
     edges = np.flatnonzero(np.diff(count) != 0)
     spans = [
         (int(part[0]), int(part[-1]))
-        for first, last in signals.intervals(swings)
+        for first, last in signals.intervals(run.field("CONTROLLER_TRACE", "gait_phase") == SINGLE_SUPPORT)
         for part in np.split(np.arange(first, last + 1), edges[(edges >= first) & (edges < last)] - first + 1)
     ]
-    truth = dict(zip(*(rows.tolist() for rows in signals.truth_of_ticks(run)), strict=True)) if "TRUTH" in run else {}
+    planned, made = _steps_along_heading(run, foothold, foot), _feet_apart(run)
     found = []
     for first, last in spans:
-        came_down = last + 1 < len(time) and count[last + 1] == count[last] + 1
         swing, row = int(foot[last]), last + 1
-        plan = field("foothold")[last]
         touchdown = None
-        if came_down:
-            made = _made(run, row, truth.get(row), swing)
-            planned = signals.in_heading((plan - feet[last, 1 - swing])[None], _yaw(run, "CONTROLLER_TRACE", last))[0]
-            error = (float((made - planned)[0]), float((made - planned)[1]))
-            touchdown = Touchdown(float(time[row]), float(time[row] - time[first]), feet[row, swing], error)
+        if row < len(time) and count[row] == count[last] + 1:
+            error = (1 - 2 * swing) * made[row] - planned[last]
+            reached = (float(error[0]), float(error[1]))
+            touchdown = Touchdown(float(time[row]), float(time[row] - time[first]), feet[row, swing], reached)
         found.append(
             Step(
                 foot=swing,
                 rows=(first, last),
                 lift_off=float(time[first]),
                 touchdown=touchdown,
-                planned_time=float(field("swing_time")[first]),
-                first_foothold=field("foothold")[first],
-                foothold=plan,
-                recovering=bool(field("recovering")[first : last + 1].any()),
-                crossing=bool(field("crossing")[last] != 0),
+                planned_time=float(swing_time[first]),
+                first_foothold=foothold[first],
+                foothold=foothold[last],
+                recovering=bool(recovering[first : last + 1].any()),
+                crossing=bool(crossing[last] != 0),
             )
         )
     return found
 
 
+def _steps_along_heading(run: Run, foothold: Array, swing: Array) -> Floats:
+    """m, (n, 3), forward, left and up: from the standing foot to the planned foothold, by the estimate."""
+    support = run.field("CONTROLLER_TRACE", "p_WF")[np.arange(len(swing)), 1 - swing]
+    return signals.in_heading(foothold - support, _yaw(run, "CONTROLLER_TRACE"))
+
+
+def _feet_apart(run: Run) -> Floats:
+    """m, (n, 3), forward, left and up: from the right foot to the left, by the truth where it is logged."""
+
+    def of(channel: str) -> Floats:
+        feet = run.field(channel, "p_WF")
+        return signals.in_heading(feet[:, 0] - feet[:, 1], _yaw(run, channel))
+
+    apart = of("CONTROLLER_TRACE")
+    if "TRUTH" in run:
+        rows, truth_rows = signals.truth_of_ticks(run)
+        apart[rows] = of("TRUTH")[truth_rows]
+    return apart
+
+
+def _yaw(run: Run, channel: str) -> Floats:
+    """rad, (n,), of the trunk"""
+    return np.asarray(signals.roll_pitch_yaw(run.field(channel, "quat_WB"))[:, 2])
+
+
 def landed(made: list[Step]) -> list[tuple[Step, Touchdown]]:
     """Those with a touchdown."""
     return [(step, step.touchdown) for step in made if step.touchdown is not None]
-
-
-def _made(run: Run, row: int, truth_row: int | None, swing: int) -> Floats:
-    """m, (3,), forward, left and up: the step from the standing foot to the one that came down, by the truth if it is
-    logged."""
-    channel, at = ("CONTROLLER_TRACE", row) if truth_row is None else ("TRUTH", truth_row)
-    feet = run.field(channel, "p_WF")[at]
-    return np.asarray(signals.in_heading((feet[swing] - feet[1 - swing])[None], _yaw(run, channel, at))[0])
-
-
-def _yaw(run: Run, channel: str, row: int) -> Floats:
-    """rad, (1,)"""
-    return np.asarray(signals.roll_pitch_yaw(run.field(channel, "quat_WB")[row : row + 1])[:, 2])
 
 
 def swing_error(run: Run) -> Floats:
@@ -244,7 +251,7 @@ def _path(run: Run) -> tuple[Floats, Floats, Floats]:
     """(t [s], p_WC [m] (n, 3), yaw of the trunk [rad] (n,) unwrapped)."""
     channel = "TRUTH" if "TRUTH" in run else "CONTROLLER_TRACE"
     position = run.field(channel, "p_WC") if channel == "TRUTH" else run.field(channel, "x")[:, 3:6]
-    yaw = np.unwrap(signals.roll_pitch_yaw(run.field(channel, "quat_WB"))[:, 2])
+    yaw = np.unwrap(_yaw(run, channel))
     return run.time(channel), position, yaw
 
 

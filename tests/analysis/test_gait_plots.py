@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from matplotlib.axes import Axes
-from matplotlib.collections import PolyCollection
+from matplotlib.collections import LineCollection, PolyCollection
 from matplotlib.lines import Line2D
 from matplotlib.patches import StepPatch
 from stance import estimation, gait_plots, plots, style, walking
@@ -148,11 +148,14 @@ def test_a_robot_in_the_air_has_no_zmp() -> None:
 def test_the_swings_show_their_error_and_the_footholds_theirs(walk: Run) -> None:
     figure = plots.PLOTS["swing"].draw(walk)
     left = titled(figure, "Left foot less its reference")
-    drawn = [one for one in left.lines if len(one.get_xdata())]
-    up = [one.get_ydata() for one in drawn if one.get_color() == style.SERIES[2]]
+    _, _, up = (bundle.get_segments() for bundle in left.collections if isinstance(bundle, LineCollection))
     assert len(up) == STEPS / 2
-    assert np.concatenate(up) == pytest.approx(np.full(6 * 20, 4.0))
-    assert drawn[0].get_xdata() == pytest.approx(10.0 * np.arange(20))
+    for swing in up:
+        assert swing == pytest.approx(np.column_stack([10.0 * np.arange(20), np.full(20, 4.0)]))
+    side = titled(figure, "Left foot's swings")
+    feet, _ = (bundle.get_segments() for bundle in side.collections if isinstance(bundle, LineCollection))
+    tips = walk.field("CONTROLLER_TRACE", "p_WF")[105:125]
+    assert feet[0] == pytest.approx(1000 * (tips[:, 0] - tips[:, 1])[:, [0, 2]], abs=1.0)
     footholds = titled(figure, "Foothold reached")
     assert line(footholds, "right foot, forward").get_ydata() == pytest.approx([12.0] * 6)
     assert line(footholds, "left foot, left").get_ydata() == pytest.approx([-5.0] * 6)
