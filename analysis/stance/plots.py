@@ -505,9 +505,7 @@ def estimator(run: Run) -> Figure:
             ax.set_ylabel(f"{name} [{unit}]")
             inside = 100 * float(np.mean(np.abs(error[:, row]) <= 2.0 * sigma[:, row]))
             ax.text(0.99, 0.97, f"{inside:.0f}% within", transform=ax.transAxes, ha="right", va="top", fontsize=7.5)
-            settled = band[np.isfinite(band)]  # what it begins with may be far wider than what it comes to
-            widest = float(np.percentile(settled, 98.0)) if len(settled) else 0.0
-            _about_zero(ax, max(1000 * (signals.largest(np.abs(error[:, row])) or 0.0), widest))
+            _about_zero(ax, 1000 * error[:, row], band)
         axes[0, column].set_title(title)
     nees, nis, height = axes[3]
     _honesty(nees, found.time, found.nees, estimation.NEES_FREEDOM, "NEES per degree of freedom")
@@ -517,7 +515,7 @@ def estimator(run: Run) -> Figure:
     height.legend(loc="upper left", ncols=2, fontsize=7.0)
     height.set_title("Height over a loaded foot")
     height.set_ylabel("[mm]")
-    _about_zero(height, 1000 * (signals.largest(np.abs(found.height)) or 0.0))
+    _about_zero(height, 1000 * found.height)
     for column in range(3):
         shade(list(axes[:, column]), run)
         time_axis(list(axes[:, column]), run)
@@ -525,9 +523,14 @@ def estimator(run: Run) -> Figure:
     return fig
 
 
-def _about_zero(ax: Axes, half: float) -> None:
-    """Limits that hold ±`half` [mm or mrad], and do not magnify what is smaller than 0.5."""
-    ax.set_ylim(-1.3 * max(half, 0.5), 1.3 * max(half, 0.5))
+def _about_zero(ax: Axes, *series: Array) -> None:
+    """Limits that hold all but what series [mm or mrad] begin with or end in, and do not magnify below 0.5."""
+    half = 0.5
+    for values in series:
+        finite = np.abs(values[np.isfinite(values)])
+        if len(finite):
+            half = max(half, min(float(finite.max()), 3.0 * float(np.percentile(finite, 98.0))))
+    ax.set_ylim(-1.3 * half, 1.3 * half)
 
 
 def _honesty(ax: Axes, time: Floats, values: Floats, freedom: int | None, title: str) -> None:
