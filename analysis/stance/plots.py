@@ -544,7 +544,7 @@ def _honesty(ax: Axes, time: Floats, values: Floats, freedom: int | None, title:
     counts, _ = np.histogram(time[known], seconds)
     sums, _ = np.histogram(time[known], seconds, weights=values[known])
     means = np.divide(sums, counts, out=np.full(len(counts), np.nan), where=counts > 0)
-    ax.stairs(means, seconds, baseline=None, color=style.ESTIMATE, lw=1.6, label="mean of 1 s")
+    ax.stairs(means, seconds, baseline=None, color=style.ESTIMATE, lw=1.6, label="mean of 1 s", zorder=4)
     ax.axhline(1.0, color=style.REFERENCE, lw=0.8)
     ax.set_yscale("log")
     ax.set_ylim(0.03, 30.0)

@@ -12,6 +12,7 @@ import matplotlib
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from PIL import Image
 
@@ -43,8 +44,15 @@ JOINTS = ("#1769aa", "#e07b1a", "#2e8b57", "#8e5bb5", "#c2185b", "#6d4c41", "#00
 STAGES = ("#b8c4d0", "#8fa3b5", "#7fb4d9", "#4f94c4", "#2e8b57", "#1769aa", "#e07b1a", "#d9a441", "#8e5bb5", "#a1887f")
 SERIES = ("#1769aa", "#e07b1a", "#2e8b57", "#8e5bb5")
 
-PALETTE = 128  # colours of a png
+PALETTE = 192  # colours of a png
 BAR = 0.035  # of an axis, the thickness of a stance bar
+
+OWN = tuple(
+    dict.fromkeys(
+        [PAPER, INK, MUTED, GOOD, BAD, PUSH, PUSH_INK, TRUTH, ESTIMATE, PLANNED, *FEET, *JOINTS, *STAGES, *SERIES]
+    )
+)
+"""of the palette whatever else a picture shows"""
 
 RC: dict[str, Any] = {
     "font.family": "DejaVu Sans",
@@ -109,9 +117,24 @@ def render(figure: Figure, kind: str = "png", dpi: int = 120) -> bytes:
         return written.getvalue()
     smaller = io.BytesIO()
     with Image.open(written) as image:
-        few = image.convert("RGB").quantize(PALETTE, Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
-        few.save(smaller, "PNG", optimize=True)
+        _in_few_colours(image.convert("RGB")).save(smaller, "PNG", optimize=True)
     return smaller.getvalue()
+
+
+def _in_few_colours(image: Image.Image) -> Image.Image:
+    """With a palette of what the image has most of and of `OWN`, which stay exactly what they are."""
+    most = image.quantize(PALETTE - len(OWN), Image.Quantize.MEDIANCUT, dither=Image.Dither.NONE)
+    own = np.array([[round(255 * part) for part in to_rgb(one)] for one in OWN], np.int64)
+    weights = np.array([1 << 16, 1 << 8, 1])
+    pixels, index = np.asarray(image, np.int64) @ weights, np.array(most)
+    for place, colour in enumerate(own @ weights):
+        index[pixels == colour] = PALETTE - len(OWN) + place
+    few = Image.fromarray(index)
+    colours = np.zeros((PALETTE, 3), np.uint8)
+    found = np.array(most.getpalette() or [], np.uint8).reshape(-1, 3)[: PALETTE - len(OWN)]
+    colours[: len(found)], colours[-len(OWN) :] = found, own
+    few.putpalette(colours.tobytes())
+    return few
 
 
 @contextmanager
