@@ -155,15 +155,18 @@ def _number(found: Any, metric: str, limit: Limit) -> float:
 
 
 def figure(figures: Mapping[str, Any], metric: str, where: str) -> Any:
-    """What stands at a dotted path; None in a section that is None. Raises StanceError where there is no such path."""
+    """What stands at a dotted path; None in a section that is None or past a list's end.
+
+    Raises StanceError where there is no such path.
+    """
     found: Any = figures
     for key in metric.split("."):
         if found is None:
             return None  # a section that this log does not give
         if isinstance(found, Mapping) and key in found:
             found = found[key]
-        elif isinstance(found, list | tuple) and key.isdecimal() and int(key) < len(found):
-            found = found[int(key)]
+        elif isinstance(found, list | tuple) and key.isdecimal():
+            found = found[int(key)] if int(key) < len(found) else None  # a run that ended earlier
         else:
             raise StanceError(f"{where}: no figure {metric!r} in a summary")
     return found

@@ -57,10 +57,12 @@ def test_what_the_log_lacks_fails_unless_it_is_optional() -> None:
     verdict = judge(FIGURES, [Limit("qp", "qp.failures", "max", 0, optional=True)])
     assert verdict.passed
     assert verdict.findings[0].measured == "not in the log"
+    later = Limit("a stretch that the run did not come to", "segments.2.wanted", "max", 3.0, optional=True)
+    assert judge(FIGURES, [later]).findings[0].measured == "not in the log"
 
 
 def test_a_limit_on_an_unknown_figure_is_an_error() -> None:
-    for metric in ("trunk.tilt_max", "segments.2.wanted", "segments.-1.wanted", "fell.0", "segments.first"):
+    for metric in ("trunk.tilt_max", "segments.-1.wanted", "fell.0", "segments.first"):
         with pytest.raises(StanceError, match=f"limit 'tilt': no figure '{metric}'"):
             judge(FIGURES, [Limit("tilt", metric, "max", 3.0)])
     with pytest.raises(StanceError, match=r"limit 'tilt': segments\.1\.wanted is no number"):
@@ -97,7 +99,9 @@ def test_what_is_no_list_of_limits_is_an_error(text: str) -> None:
 def test_every_list_that_comes_with_the_package_names_figures_that_exist(path: Path) -> None:
     log = Log.from_bytes(Synthetic(duration=5.0, walk=Walk(start=1.0, speed=0.4)).log())
     findings = judge(measure(log.run(), log.report).as_dict(), load_limits(path)).findings
-    assert findings and all(finding.value is not None for finding in findings)
+    # A list may name stretches of its own scenario's script.
+    figures = [finding for finding in findings if not finding.limit.metric.startswith("segments.")]
+    assert figures and all(finding.value is not None for finding in figures)
 
 
 def test_standing_keeps_the_limits_and_falling_or_standing_without_states_does_not(stand: Run) -> None:

@@ -38,6 +38,10 @@ def single_body(out: Path) -> dict[str, Any]:
     return {"fell": record(request(out, False, LOCKSTEP_DURATION, "single_body")).fell}
 
 
+def walk(out: Path) -> dict[str, Any]:
+    return {"fell": record(request(out, False, LOCKSTEP_DURATION, "walk_noisy")).fell}
+
+
 def lockstep_with_false_truth(out: Path) -> dict[str, Any]:
     """Somebody else says TRUTH all the time, and nothing that it says is true."""
     done = threading.Event()
@@ -214,6 +218,7 @@ if __name__ == "__main__":
     scene = {
         "lockstep": lockstep,
         "single_body": single_body,
+        "walk": walk,
         "lockstep_with_false_truth": lockstep_with_false_truth,
         "real_time": real_time,
         "two_runs": two_runs,

@@ -115,6 +115,15 @@ def test_lockstep_over_lcm_equals_the_rollout_byte_for_byte(lockstep: Path, roll
     assert_same_decisions(lockstep, rollout)
 
 
+def test_a_walk_in_lockstep_over_lcm_equals_the_rollout_byte_for_byte(tmp_path: Path) -> None:
+    result, log = play_whole("walk", tmp_path, DECISIONS)
+    assert result["fell"] is False
+    assert_same_decisions(log, roll_out("walk_noisy", tmp_path))
+    run = Log.open(log).run()
+    assert run.field("CONTROLLER_TRACE", "steps").max() > 20
+    assert run.field("TRUTH", "p_WB")[-1, 0] > 2.5  # m, forward
+
+
 def test_the_rollouts_log_holds_what_lockstep_over_lcm_says_in_its_order(lockstep: Path, rollout: Path) -> None:
     import lcm
 
