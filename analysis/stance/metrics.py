@@ -461,35 +461,38 @@ def planned_forces(run: Run) -> tuple[Floats, Array]:
     return force, planned & (run.field("FORCE_PLAN", "contact")[:, 0, :used] != 0)
 
 
-def friction_at(run: Run, channel: str) -> Floats:
-    """mu that the controller plans with at each instant of a channel, (n,); nan where the log does not say.
+def has_a_gait(run: Run, channel: str) -> Array:
+    """Whether the controller had a gait at each instant of a channel, (n,) bool.
 
     What TRUTH says is of the period that ended: of the tick before.
     """
-    standing, walking = (
-        np.nan if mu is None else mu for mu in (configuration.friction(run, way) for way in (False, True))
-    )
     if "CONTROLLER_TRACE" not in run:
-        return np.full(run.count(channel), standing)
+        return np.zeros(run.count(channel), bool)
     time = run.time("CONTROLLER_TRACE")
     order = np.argsort(time, kind="stable")
     tick = np.searchsorted(time[order], run.time(channel), side="left" if channel == "TRUTH" else "right") - 1
-    gait = run.field("CONTROLLER_TRACE", "gait_phase")[order][np.maximum(tick, 0)] != signals.STANDING
-    return np.where(gait, walking, standing)
+    return np.asarray(run.field("CONTROLLER_TRACE", "gait_phase")[order][np.maximum(tick, 0)] != signals.STANDING)
+
+
+def friction_at(run: Run, channel: str) -> Floats:
+    """mu that the controller plans with at each instant of a channel, (n,); nan where the log does not say."""
+    mu = [configuration.friction(run, walking) for walking in (True, False)]
+    walking, standing = (np.nan if one is None else one for one in mu)
+    return np.where(has_a_gait(run, channel), walking, standing)
 
 
 def cone_share(run: Run, channel: str, force: Array) -> Floats:
     """max(|fx|, |fy|) / (mu fz) of forces [N] (n, contacts, 3) in W of a channel's instants → (n, contacts).
 
-    Of the force QP's friction pyramid: its sides are along the reference's heading, not along W's axes; 1 is its edge.
-    nan where there is no load, or mu is not known.
+    Of the force QP's friction pyramid, 1 is its edge: its sides are along the reference's heading while the robot
+    stands, and along W's axes while it has a gait. nan where there is no load, or mu is not known.
     """
     yaw = np.zeros(1)
     if "CONTROLLER_TRACE" in run:
         time = run.time("CONTROLLER_TRACE")
         order = np.argsort(time, kind="stable")
         heading = np.unwrap(run.field("CONTROLLER_TRACE", "x_ref")[order, 2])
-        yaw = np.interp(run.time(channel), time[order], heading)
+        yaw = np.where(has_a_gait(run, channel), 0.0, np.interp(run.time(channel), time[order], heading))
     cos, sin = np.cos(yaw)[:, None], np.sin(yaw)[:, None]
     along = np.abs(cos * force[..., 0] + sin * force[..., 1])
     across = np.abs(cos * force[..., 1] - sin * force[..., 0])

@@ -257,6 +257,17 @@ def test_planned_and_true_forces_are_measured_by_one_pyramid_along_the_heading()
     assert shares[25] == pytest.approx(0.2 / 0.55, abs=1e-6)  # at 180 degrees
 
 
+def test_the_pyramid_of_a_robot_that_walks_is_along_the_worlds_axes() -> None:
+    plan, decided = ticked("force_plan_t", N), trace()
+    plan["num_contacts"], plan["num_stages"], plan["contact"][:, 0, :2] = 2, 1, 1
+    plan["force"][:, 0, :2] = 11.0, 11.0, 40.0
+    decided["x_ref"][:, 2] = np.radians(45.0)
+    decided["gait_phase"][50:] = signals.SINGLE_SUPPORT
+    run = run_of(base(FORCE_PLAN=plan, CONTROLLER_TRACE=decided))
+    shares = metrics.cone_share(run, "FORCE_PLAN", metrics.planned_forces(run)[0])
+    assert shares[[10, 60], 0] == pytest.approx([np.sqrt(2.0) * 0.5, 0.5])
+
+
 def test_a_robot_that_walks_is_measured_by_the_friction_that_it_walks_with() -> None:
     plan, messages, decided = ticked("force_plan_t", N), truth(), trace()
     decided["gait_phase"][40:60], decided["gait_phase"][60:80] = signals.DOUBLE_SUPPORT, signals.SINGLE_SUPPORT
