@@ -186,8 +186,9 @@ def ground_ways(run: Run) -> GroundWays:
     return GroundWays(run.time("TRUTH"), position[:, :2], dcm, np.einsum("nf,nfk->nk", shares, tips[:, :, :2]))
 
 
-def foothold_places(run: Run, landed: list[tuple[Step, Touchdown]]) -> Floats:
-    """m, (steps, 2, 2): where each foot came down by the truth, and where it was to come down as planned last."""
+def foothold_places(run: Run) -> tuple[list[tuple[Step, Touchdown]], Floats]:
+    """The steps that came down, and where by the truth and as planned last: m, (steps, 2, 2). Those that are finite."""
+    landed = walking.landed(walking.steps(run))
     yaw = signals.roll_pitch_yaw(run.field("TRUTH", "quat_WB"))[:, 2]
     found = np.empty((len(landed), 2, 2))
     for place, (step, down) in zip(found, landed, strict=True):
@@ -195,7 +196,13 @@ def foothold_places(run: Run, landed: list[tuple[Step, Touchdown]]) -> Floats:
         place[0] = run.field("TRUTH", "p_WF")[row, step.foot, :2]
         error = np.array([[*down.error, 0.0]])
         place[1] = place[0] - signals.in_heading(error, -yaw[row : row + 1])[0, :2]
-    return found
+    finite = np.asarray(np.isfinite(found).all(axis=(1, 2)))
+    return [one for one, whole in zip(landed, finite, strict=True) if whole], found[finite]
+
+
+def maps(run: Run) -> bool:
+    """Whether the log holds footholds to draw."""
+    return "TRUTH" in run and len(foothold_places(run)[0]) > 0
 
 
 def _strips(ways: GroundWays, landed: list[tuple[Step, Touchdown]]) -> list[tuple[float, float]]:
@@ -212,8 +219,7 @@ def _strips(ways: GroundWays, landed: list[tuple[Step, Touchdown]]) -> list[tupl
 @styled
 def footholds(run: Run) -> Figure:
     """8: from above: where the feet came down and were to come down, the ways of C, of the ZMP and of the DCM."""
-    landed = walking.landed(walking.steps(run))
-    ways, places = ground_ways(run), foothold_places(run, landed)
+    ways, (landed, places) = ground_ways(run), foothold_places(run)
     times = np.array([down.time for _, down in landed])
     at = np.clip(np.searchsorted(run.time("TRUTH"), times), 0, run.count("TRUTH") - 1)
     yaw = signals.roll_pitch_yaw(run.field("TRUTH", "quat_WB")[at])[:, 2]

@@ -14,7 +14,7 @@ from scipy.stats import chi2
 
 from . import configuration, estimation, metrics, signals, style, walking
 from .check import Verdict
-from .gait_plots import footholds, gait, swing, velocity
+from .gait_plots import footholds, gait, maps, swing, velocity
 from .metrics import Metrics
 from .picture import drawable, picture
 from .plain import counted
@@ -562,10 +562,6 @@ class Plot:
     """whether the log holds what it draws: only then may it be drawn"""
 
 
-def _has_landed(run: Run) -> bool:
-    return len(walking.landed(walking.steps(run))) > 0
-
-
 PLOTS = {
     "picture": Plot("The robot", picture, drawable),
     "walk": Plot("The walk from the side", walk, walks),
@@ -578,7 +574,7 @@ PLOTS = {
     ),
     "gait": Plot("Gait", gait, lambda run: signals.num_contacts(run) > 0),
     "velocity": Plot("Velocity", velocity, lambda run: "CONTROLLER_TRACE" in run),
-    "footholds": Plot("Footholds from above", footholds, lambda run: "TRUTH" in run and _has_landed(run)),
+    "footholds": Plot("Footholds from above", footholds, maps),
     "swing": Plot("Swing tracking and stance slip", swing, lambda run: len(walking.steps(run)) > 0),
     "estimator": Plot("Estimator", estimator, lambda run: estimation.errors(run) is not None),
     "joints": Plot("Joints", joints, lambda run: metrics.joint_shares(run) is not None),

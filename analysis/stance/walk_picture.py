@@ -18,7 +18,7 @@ from scipy.spatial import ConvexHull
 from . import configuration, signals, style, walking
 from .errors import UnreadableError
 from .picture import LINK_COLOUR, TRUNK_COLOUR, box_corners, drawable, whole_rows
-from .series import Array, Floats, Run
+from .series import Array, Floats, Integers, Run
 from .style import new_figure, styled
 from .urdf import Robot, foot_radius, rotation_from_quaternion, transform
 
@@ -42,7 +42,7 @@ class SideView:
     legs: list[Floats]
     """of each, (n, points, 2): from the trunk to the tip"""
     trunk: list[Floats]
-    """of each instant, (corners, 2)"""
+    """of each instant, (corners, 2); none of a trunk without a box"""
     p_WC: Floats
     """(n, 2)"""
     tips: Floats
@@ -53,7 +53,17 @@ class SideView:
 
 def walks(run: Run) -> bool:
     """Whether the log holds a walk that can be drawn."""
-    return drawable(run) and len(walking.landed(walking.steps(run))) > 0
+    return drawable(run) and _has_landed(run) and len(_rows_between(run, *middle_of_the_walk(run))) > 1
+
+
+def _has_landed(run: Run) -> bool:
+    return len(walking.landed(walking.steps(run))) > 0
+
+
+def _rows_between(run: Run, first: float, last: float) -> Integers:
+    """Rows of TRUTH that can be drawn, from `first` to `last` [s]."""
+    time, rows = run.time("TRUTH"), whole_rows(run)
+    return rows[(time[rows] >= first - 1e-9) & (time[rows] <= last + 1e-9)]
 
 
 def middle_of_the_walk(run: Run) -> tuple[float, float]:
@@ -73,8 +83,7 @@ def middle_of_the_walk(run: Run) -> tuple[float, float]:
 
 def side_view(run: Run, first: float, last: float, body: Robot) -> SideView:
     """From `first` to `last` [s], at every state of the log."""
-    time, rows = run.time("TRUTH"), whole_rows(run)
-    rows = rows[(time[rows] >= first - 1e-9) & (time[rows] <= last + 1e-9)]
+    rows = _rows_between(run, first, last)
 
     def of(name: str) -> Array:
         return run.field("TRUTH", name)[rows]
@@ -105,10 +114,11 @@ def side_view(run: Run, first: float, last: float, body: Robot) -> SideView:
         legs.append(drawn(np.stack(points, axis=1)))
     boxes = [shape for shape in body.links[body.root].visual if shape.kind == "box"]
     trunk = [
-        np.concatenate([drawn(box_corners(T_WB @ box.T_link, box)) for box in boxes]) for T_WB in frames[body.root]
+        np.concatenate([np.empty((0, 2)), *(drawn(box_corners(T_WB @ box.T_link, box)) for box in boxes)])
+        for T_WB in frames[body.root]
     ]
     return SideView(
-        time=time[rows],
+        time=run.time("TRUTH")[rows],
         legs=legs,
         trunk=trunk,
         p_WC=drawn(of("p_WC")),
@@ -127,7 +137,7 @@ def walk(run: Run) -> Figure:
     view = side_view(run, first, last, body)
     low, high = view.p_WC[:, 0].min() - MARGIN, view.p_WC[:, 0].max() + MARGIN
     ground = _ground(view, [foot_radius(body, link) for link, _ in body.feet()])
-    bottom, top = float(ground[:, 1].min()) - BELOW, max(float(box[:, 1].max()) for box in view.trunk) + ABOVE
+    bottom, top = float(ground[:, 1].min()) - BELOW, np.concatenate([view.p_WC, *view.trunk])[:, 1].max() + ABOVE
     height = (WIDTH - 0.7) * (top - bottom) / (high - low)
     fig = new_figure(
         WIDTH, float(np.clip(height, 3.0, 7.0)) + 1.1, "Walking, seen from the side", configuration.title(run)
@@ -135,7 +145,7 @@ def walk(run: Run) -> Figure:
     ax = fig.subplots()
     sticks = _every(view.time, INTERVAL)
     for box in _whole_figures(view, sticks):
-        outline = box[ConvexHull(box).vertices]
+        outline = box[ConvexHull(box).vertices] if len(box) else box
         ax.add_patch(Polygon(outline, closed=True, fc=(TRUNK_COLOUR, 0.7), ec=LINK_COLOUR, lw=1.0, zorder=2))
     names = configuration.foot_names(run, len(view.legs))
     for foot, (leg, name) in enumerate(zip(view.legs, names, strict=True)):

@@ -223,13 +223,16 @@ def slip(run: Run) -> tuple[Floats, Floats] | None:
         q, transform(rotation_from_quaternion(run.field("TRUTH", "quat_WB")), run.field("TRUTH", "p_WB"))
     )
     moved = np.full(loaded.shape, np.nan)
+    whole = np.isfinite(run.field("TRUTH", "p_WF")[:, : len(tips)]).all(axis=(1, 2))
     for foot, (link, _) in enumerate(tips):
-        R = Rotation.from_matrix(frames[link][:, :3, :3])
+        turns = frames[link][:, :3, :3]
+        known = np.asarray(whole & np.isfinite(turns).all(axis=(1, 2)))
+        R = Rotation.from_matrix(np.where(known[:, None, None], turns, np.eye(3)))
         turned = (R[1:] * R[:-1].inv()).as_rotvec()
         rolled = foot_radius(body, link) * np.column_stack([turned[:, 1], -turned[:, 0]])  # dtheta x z
         slid = np.diff(run.field("TRUTH", "p_WF")[:, foot, :2], axis=0) - rolled
         way = np.concatenate([np.zeros((1, 2)), np.cumsum(slid, axis=0)])
-        for first, last in signals.intervals(loaded[:, foot]):
+        for first, last in signals.intervals(loaded[:, foot] & known):
             moved[first : last + 1, foot] = np.linalg.norm(way[first : last + 1] - way[first], axis=1)
     return run.time("TRUTH"), moved
 

@@ -49,9 +49,9 @@ RENDERED = (
 )  # the others are drawn up to their layout: it is what takes the time
 
 
-def diverged(after: int) -> Run:
+def diverged(after: int, walk: Walk | None = None) -> Run:
     """Nothing that is finite from one row on."""
-    messages = Synthetic(duration=0.6, pushes=[(0.2, 0.1, (5.0, 0.0, 0.0))]).messages()
+    messages = Synthetic(duration=0.6, pushes=[(0.2, 0.1, (5.0, 0.0, 0.0))], walk=walk).messages()
     for channel in ("TRUTH", "FORCE_PLAN", "CONTROLLER_TRACE"):
         for name in messages[channel].dtype.names or ():
             if messages[channel].dtype[name].base.kind == "f":
@@ -68,6 +68,8 @@ KINDS = {
     "no truth": without_truth,
     "diverged": lambda: diverged(35),
     "never finite": lambda: diverged(0),
+    "walk diverged": lambda: diverged(40, Walk(start=0.0, speed=0.4)),
+    "walk never finite": lambda: diverged(0, Walk(start=0.0, speed=0.4)),
     "one state": lambda: run_of({"ROBOT_STATE": ticked("robot_state_t", 1)}),
     "walk": lambda: Log.from_bytes(
         Synthetic(duration=3.0, pushes=[(1.9, 0.1, (5.0, 0.0, 0.0))], walk=Walk(start=0.5, speed=0.4)).log()
