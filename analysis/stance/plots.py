@@ -46,7 +46,13 @@ def summary_card(run: Run, measured: Metrics, verdict: Verdict | None = None) ->
     ax.add_patch(Rectangle((0.0, 0.0), WIDTH, 1.15, color=colour, lw=0))
     word = "PASS" if passed else "FAIL"
     ax.text(0.35, 0.58, word, fontsize=30, fontweight="bold", color="white", va="center")
-    outcome = f"fell after {measured.fell_at:.2f} s" if measured.fell_at is not None else f"stood {run.duration:.1f} s"
+    outcome = f"stood {run.duration:.1f} s"
+    if measured.fell_at is not None:
+        outcome = f"fell after {measured.fell_at:.2f} s"
+    elif measured.walking is not None:
+        outcome = (
+            f"{counted(measured.walking.steps, 'step')}, {measured.walking.distance:.1f} m in {run.duration:.1f} s"
+        )
     ax.text(2.25, 0.40, f"{configuration.title(run)}: {outcome}", fontsize=15, color="white", va="center")
     kept = (
         f"{len(findings) - len(verdict.violated) - len(verdict.slow)} of {len(findings)} limits kept"

@@ -98,6 +98,20 @@ def test_every_plot_that_is_possible_draws_without_a_warning(name: str, any_run:
             assert style.render(figure, dpi=30).startswith(b"\x89PNG")
 
 
+@pytest.mark.parametrize(
+    ("made", "words"),
+    [
+        (Synthetic(duration=3.0, pushes=[], walk=Walk(start=0.5, speed=0.4)), "10 steps, 1.0 m in 3.0 s"),
+        (Synthetic(duration=1.0, pushes=[]), "stood 1.0 s"),
+        (Synthetic(duration=2.0, pushes=[], fall_at=1.0), "fell after 1.40 s"),
+    ],
+)
+def test_the_card_says_what_came_out(made: Synthetic, words: str) -> None:
+    run = Log.from_bytes(made.log()).run()
+    told = [text.get_text() for ax in plots.summary_card(run, measure(run)).axes for text in ax.texts]
+    assert any(words in one for one in told), told
+
+
 def test_a_plot_is_offered_where_the_log_can_give_it(stand: Run) -> None:
     assert set(plots.PLOTS) - set(plots.available(stand)) == WALKING
     assert set(plots.PLOTS) - set(plots.available(without_truth())) == {"picture", "estimator", *WALKING}
