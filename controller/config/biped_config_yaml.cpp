@@ -11,6 +11,7 @@ estimation::BaseEstimatorConfig estimator(StrictYaml yaml) {
   c.accelerometer_noise = yaml.number("accelerometer_noise");
   c.position_noise = yaml.number("position_noise");
   c.gyro_bias_noise = yaml.number("gyro_bias_noise");
+  c.position_memory = yaml.number("position_memory");
   c.accelerometer_bias_noise = yaml.number("accelerometer_bias_noise");
   c.stance_foot_noise = yaml.number("stance_foot_noise");
   c.unloading_foot_noise = yaml.number("unloading_foot_noise");

@@ -10,6 +10,10 @@
 //   4. update   each foot in contact: velocity, position; variances times 1 + ramp_gain (1 - alpha). A slipping foot's
 //               velocity is skipped, but once refused for slip_timeout it is taken, its variance times slip_inflation.
 //
+// The position's correlations fade with position_memory. Each new look at the gyro's bias also turns the way walked so
+// far about its start: far from there the position, and with it every foothold in W, would jump by more than a foot
+// may.
+//
 // Gating the velocity alone would not do: a slipping foot's position drags velocity and tilt too, hence step 3 for it.
 //
 // Where both feet were refused for slip_timeout and agree with each other, it is the filter that is wrong (a blow that
@@ -55,6 +59,7 @@ void BaseEstimatorConfig::validate() const {
       {"accelerometer_noise", accelerometer_noise, kTiny, 10.0},
       {"position_noise", position_noise, 0.0, 1.0},
       {"gyro_bias_noise", gyro_bias_noise, 0.0, 1.0},
+      {"position_memory", position_memory, 0.01, 1e9},
       {"accelerometer_bias_noise", accelerometer_bias_noise, 0.0, 1.0},
       {"stance_foot_noise", stance_foot_noise, 0.0, 1.0},
       {"unloading_foot_noise", unloading_foot_noise, 0.0, 10.0},
@@ -174,6 +179,7 @@ void BaseEstimator::advance(const ImuMean& imu) noexcept {
   q.segment<3>(kGyroBias).setConstant(squared(c.gyro_bias_noise) * imu.dt);
   q.segment<3>(kAccelerometerBias).setConstant(squared(c.accelerometer_bias_noise) * imu.dt);
   filter_.predict_covariance([&transition](ErrorMatrix& M) { transition.multiply(M); }, q);
+  fade_correlations(kPosition, std::exp(-imu.dt / c.position_memory));
 }
 
 void BaseEstimator::step_sample(const SensorSample& sample, double dt, const ContactPlan& plan) noexcept {
@@ -253,6 +259,13 @@ void BaseEstimator::forget(int begin, double variance) noexcept {
   filter_.P.middleRows<3>(begin).setZero();
   filter_.P.middleCols<3>(begin).setZero();
   filter_.P.diagonal().segment<3>(begin).setConstant(variance);
+}
+
+void BaseEstimator::fade_correlations(int begin, double keep) noexcept {
+  const Matrix3 own = filter_.P.block<3, 3>(begin, begin);
+  filter_.P.middleRows<3>(begin) *= keep;
+  filter_.P.middleCols<3>(begin) *= keep;
+  filter_.P.block<3, 3>(begin, begin) = own;
 }
 
 void BaseEstimator::update(const ErrorMeasurement& measurement, double variance) noexcept {

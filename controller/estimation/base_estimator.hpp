@@ -23,6 +23,7 @@ struct BaseEstimatorConfig {
   double swing_foot_noise = 0.0;          ///< m/sqrt(s)
   double foot_velocity_sigma = 0.0;       ///< m/s
   double foot_position_sigma = 0.0;       ///< m
+  double position_memory = 0.0;           ///< s, for which what is learnt later still moves the position
   double contact_ramp = 0.0;              ///< s, from touchdown to full trust
   double ramp_gain = 0.0;                 ///< measurement variances grow by 1 + this at no trust
   double slip_gate = 0.0;                 ///< NIS of the foot velocity (3 degrees of freedom) above which a foot slips
@@ -78,6 +79,8 @@ class BaseEstimator {
   bool given_up(int foot) const noexcept;
   /// The three parts of the error from `begin` on: uncorrelated, of this variance.
   void forget(int begin, double variance) noexcept;
+  /// Its correlations with the rest, times `keep` in 0..1: P stays a covariance.
+  void fade_correlations(int begin, double keep) noexcept;
   void update(const ErrorMeasurement& measurement, double variance) noexcept;
   void write(const SensorSample& now, BaseEstimate& estimate) const noexcept;
 

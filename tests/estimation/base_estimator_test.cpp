@@ -206,6 +206,22 @@ TEST_CASE("ConsumerSensorsGiveWhatTheSheetAsksWhileWalking") {
   CHECK(nees < kNeesHigh);
 }
 
+TEST_CASE("FarFromItsStartThePositionGoesOnAsSmoothlyAsTheVelocity") {
+  constexpr double kSmooth = 2e-3;  // m, of a control period: what a foothold in W may jump by
+  SimulatedRobot robot(Walk{1.0}.motion(), consumer_sensors(), 1);
+  BaseEstimator estimator = shipped_estimator();
+  run(robot, estimator, 60.0, Walk::plan);
+  double largest = 0.0;
+  for (int k = 0; k < 500; ++k) {
+    const BaseState before = estimator.state();
+    run(robot, estimator, kControlPeriod, Walk::plan);
+    const BaseState& after = estimator.state();
+    const Vector3 path = 0.5 * kControlPeriod * (before.v_WB + after.v_WB);
+    largest = std::max(largest, (after.p_WB - before.p_WB - path).norm());
+  }
+  CHECK(largest < kSmooth);
+}
+
 TEST_CASE("HeightOverTheFeetIsWithinAMillimetreOnCalibratedEncoders") {
   SensorErrors errors = consumer_sensors();
   errors.encoder_offset = 0.0;
