@@ -12,20 +12,6 @@ Matrix6 adjoint(const RigidTransform& T) noexcept {
   return Ad;
 }
 
-Vector6 adjoint_times(const RigidTransform& T, const Vector6& V) noexcept {
-  Vector6 out;
-  const Vector3 omega = T.R * V.head<3>();
-  out << omega, T.R * V.tail<3>() + T.p.cross(omega);
-  return out;
-}
-
-Vector6 adjoint_transpose_times(const RigidTransform& T, const Vector6& F) noexcept {
-  Vector6 out;
-  const Vector3 moment = F.head<3>() - T.p.cross(F.tail<3>());
-  out << T.R.transpose() * moment, T.R.transpose() * F.tail<3>();
-  return out;
-}
-
 Matrix6 lie_bracket(const Vector6& V) noexcept {
   const Matrix3 omega = skew(V.head<3>());
   Matrix6 ad;
@@ -33,27 +19,15 @@ Matrix6 lie_bracket(const Vector6& V) noexcept {
   return ad;
 }
 
-Vector6 lie_bracket_times(const Vector6& V, const Vector6& W) noexcept {
-  const Vector3 omega = V.head<3>(), v = V.tail<3>();
-  const Vector3 omega_w = W.head<3>(), v_w = W.tail<3>();
-  Vector6 out;
-  out << omega.cross(omega_w), v.cross(omega_w) + omega.cross(v_w);
-  return out;
-}
-
-Vector6 lie_bracket_transpose_times(const Vector6& V, const Vector6& F) noexcept {
-  const Vector3 omega = V.head<3>(), v = V.tail<3>();
-  const Vector3 moment = F.head<3>(), force = F.tail<3>();
-  Vector6 out;
-  out << moment.cross(omega) + force.cross(v), force.cross(omega);
-  return out;
-}
-
 RigidTransform exp_se3(const Vector6& V) noexcept {
-  const Rodrigues k = rodrigues(V.head<3>().squaredNorm());
-  const Matrix3 K = skew(V.head<3>());
-  const Matrix3 K2 = K * K;
-  return {Matrix3::Identity() + k.a * K + k.b * K2, V.tail<3>() + K * (k.b * V.tail<3>()) + K2 * (k.c * V.tail<3>())};
+  const Vector3 omega = V.head<3>(), v = V.tail<3>();
+  const double angle2 = omega.squaredNorm();
+  const Rodrigues k = rodrigues(angle2);
+  // [omega]x^2 = omega omega^T - |omega|^2 1
+  Matrix3 R = (k.b * omega) * omega.transpose() + k.a * skew(omega);
+  R.diagonal().array() += 1.0 - k.b * angle2;
+  const Vector3 omega_v = omega.cross(v);
+  return {R, v + k.b * omega_v + k.c * omega.cross(omega_v)};
 }
 
 Vector6 log_se3(const RigidTransform& T) noexcept {

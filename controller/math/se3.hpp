@@ -28,19 +28,41 @@ namespace math {
 Matrix6 adjoint(const RigidTransform& T) noexcept;
 
 /// Ad_T V, without forming the matrix.
-Vector6 adjoint_times(const RigidTransform& T, const Vector6& V) noexcept;
+inline Vector6 adjoint_times(const RigidTransform& T, const Vector6& V) noexcept {
+  Vector6 out;
+  const Vector3 omega = T.R * V.head<3>();
+  out << omega, T.R * V.tail<3>() + T.p.cross(omega);
+  return out;
+}
 
 /// Ad_T^T F: takes a wrench in a to the same wrench in b (MR eq. 3.98).
-Vector6 adjoint_transpose_times(const RigidTransform& T, const Vector6& F) noexcept;
+inline Vector6 adjoint_transpose_times(const RigidTransform& T, const Vector6& F) noexcept {
+  Vector6 out;
+  const Vector3 moment = F.head<3>() - T.p.cross(F.tail<3>());
+  out << T.R.transpose() * moment, T.R.transpose() * F.tail<3>();
+  return out;
+}
 
 /// ad_V = [[omega]x 0; [v]x [omega]x] (MR def. 8.1).
 Matrix6 lie_bracket(const Vector6& V) noexcept;
 
 /// ad_V(W), without forming the matrix.
-Vector6 lie_bracket_times(const Vector6& V, const Vector6& W) noexcept;
+inline Vector6 lie_bracket_times(const Vector6& V, const Vector6& W) noexcept {
+  const Vector3 omega = V.head<3>(), v = V.tail<3>();
+  const Vector3 omega_w = W.head<3>(), v_w = W.tail<3>();
+  Vector6 out;
+  out << omega.cross(omega_w), v.cross(omega_w) + omega.cross(v_w);
+  return out;
+}
 
 /// ad_V^T F, without forming the matrix.
-Vector6 lie_bracket_transpose_times(const Vector6& V, const Vector6& F) noexcept;
+inline Vector6 lie_bracket_transpose_times(const Vector6& V, const Vector6& F) noexcept {
+  const Vector3 omega = V.head<3>(), v = V.tail<3>();
+  const Vector3 moment = F.head<3>(), force = F.tail<3>();
+  Vector6 out;
+  out << moment.cross(omega) + force.cross(v), force.cross(omega);
+  return out;
+}
 
 /// exp([V]): the transform reached by following the twist V for unit time (MR prop. 3.25). Any |omega|, also 0; a screw
 /// S that turns by theta is exp_se3(S theta), whether S is of unit norm or not.
