@@ -2,26 +2,8 @@
 
 namespace stance::rigid_body {
 
-Vector6 SpatialInertia::operator*(const Vector6& V) const noexcept {
-  Vector6 out;
-  out << inertia * V.head<3>(), mass * V.tail<3>();
-  return out;
-}
-
-ScrewTree screw_tree(const Model& model) noexcept {
-  ScrewTree tree;
-  tree.num_joints = model.num_joints;
-  for (int b = 0; b < model.num_bodies(); ++b) tree.G[b] = {model.bodies[b].inertia, model.bodies[b].mass};
-  for (int i = 0; i < model.num_joints; ++i) {
-    const Joint& joint = model.joints[i];
-    const Vector3& com = model.bodies[i + 1].com;
-    const Matrix3 R_JP = joint.R_PJ.transpose();
-    tree.parent[i] = joint.parent;
-    tree.M[i] = {R_JP, R_JP * (model.bodies[joint.parent].com - joint.p_PJ) - com};
-    // The axis passes through the link frame's origin, at -com in the frame of the centre of mass.
-    tree.A[i] << joint.axis, joint.axis.cross(com);
-  }
-  return tree;
+Vector6 single_body_wrench(const SpatialInertia& G, const Vector6& V, const Vector6& Vd) noexcept {
+  return G * Vd - math::lie_bracket_transpose_times(V, G * V);
 }
 
 void newton_euler(const ScrewTree& tree, const JointVector& theta, const JointVector& thetad,
@@ -34,13 +16,13 @@ void newton_euler(const ScrewTree& tree, const JointVector& theta, const JointVe
   for (int i = 0; i < tree.num_joints; ++i) {
     const int parent = tree.parent[i], body = i + 1;
     const Vector6& A = tree.A[i];
-    T[i] = math::exp_se3(-theta(i) * A) * tree.M[i];                                                    // 8.50
+    T[i] = tree.link_from_parent(i, theta(i));                                                          // 8.50
     V[body] = math::adjoint_times(T[i], V[parent]) + A * thetad(i);                                     // 8.51
     Vd[body] = math::adjoint_times(T[i], Vd[parent]) + math::lie_bracket_times(V[body], A) * thetad(i)  // 8.52
                + A * thetadd(i);
   }
   for (int b = 0; b <= tree.num_joints; ++b) {
-    F[b] = F_out[b] + tree.G[b] * Vd[b] - math::lie_bracket_transpose_times(V[b], tree.G[b] * V[b]);
+    F[b] = F_out[b] + single_body_wrench(tree.G[b], V[b], Vd[b]);
   }
   tau.setZero();
   // A child stands after its parent, so that F of a body is complete when its turn comes.

@@ -4,12 +4,13 @@
 
 #include <catch2/catch_test_macros.hpp>
 
-#include "tests/support/golden.hpp"
+#include "tests/rigid_body/book_chain.hpp"
 
 using namespace stance;
 using namespace stance::test;
 using rigid_body::BodySixVectors;
 using rigid_body::ScrewTree;
+using rigid_body::SpatialInertia;
 
 namespace {
 
@@ -20,33 +21,8 @@ struct Chain {
   ScrewTree tree;
   RigidTransform M_tip;  ///< M_(n+1,n)
 
-  explicit Chain(const YAML::Node& file) {
-    const Eigen::MatrixXd S = golden_matrix<6>(file, "Slist");
-    tree.num_joints = static_cast<int>(S.cols());
-    RigidTransform M_0i;
-    for (int i = 0; i <= tree.num_joints; ++i) {
-      const auto M = as_matrix<4, 4>(file["Mlist"][i]);
-      const RigidTransform M_step{M.topLeftCorner<3, 3>(), M.topRightCorner<3, 1>()};
-      if (i == tree.num_joints) {
-        M_tip = M_step.inverse();
-        break;
-      }
-      M_0i = M_0i * M_step;
-      tree.parent[i] = i;
-      tree.M[i] = M_step.inverse();
-      tree.A[i] = math::adjoint_times(M_0i.inverse(), S.col(i));
-      const auto G = as_matrix<6, 6>(file["Glist"][i]);
-      REQUIRE(max_difference(G, Matrix6(inertia_matrix(G))) == 0.0);
-      tree.G[i + 1] = {G.topLeftCorner<3, 3>(), G(3, 3)};
-    }
-  }
-
-  static Matrix6 inertia_matrix(const Matrix6& G) {
-    Matrix6 out = Matrix6::Zero();
-    out.topLeftCorner<3, 3>() = G.topLeftCorner<3, 3>();
-    out.bottomRightCorner<3, 3>().diagonal().setConstant(G(3, 3));
-    return out;
-  }
+  explicit Chain(const YAML::Node& file) : Chain(read_book_chain(file)) {}
+  explicit Chain(const BookChain& book) : tree(book.tree()), M_tip(book.M.back().inverse()) {}
 
   Eigen::VectorXd torques(const Eigen::VectorXd& theta, const Eigen::VectorXd& thetad, const Eigen::VectorXd& thetadd,
                           const Vector3& g, const Vector6& F_tip) const {
@@ -108,16 +84,21 @@ TEST_CASE("NewtonEulerOfASingleBodyIsItsWrenchAtTheCentreOfMass") {
   // f = m (vd + omega x v), moment = I omegad + omega x I omega (8.22, 8.23).
   const YAML::Node file = load_golden("wrench003.json");
   for (const YAML::Node& c : golden_cases(file)) {
-    ScrewTree body;
-    body.G[0] = {golden_matrix<3, 3>(c, "I"), golden_number(c, "m")};
-    Vector6 V, Vd, expected, F;
+    Vector6 V, Vd, expected;
     V << golden_vector<3>(c, "omega"), golden_vector<3>(c, "v");
     Vd << golden_vector<3>(c, "omega_dot"), golden_vector<3>(c, "v_dot");
     expected << golden_vector<3>(c, "moment"), golden_vector<3>(c, "force");
+    const SpatialInertia G{golden_matrix<3, 3>(c, "I"), golden_number(c, "m")};
+    check_close(rigid_body::single_body_wrench(G, V, Vd), expected);
+
+    // The recursion over a tree of one body says the same.
+    ScrewTree body;
+    body.G[0] = G;
     const JointVector none = JointVector::Zero();
     BodySixVectors F_out;
     F_out.fill(Vector6::Zero());
     JointVector tau;
+    Vector6 F;
     rigid_body::newton_euler(body, none, none, none, V, Vd, F_out, F, tau);
     check_close(F, expected);
   }

@@ -6,7 +6,7 @@
 
 #include "controller/math/se3.hpp"
 #include "tests/rigid_body/biped_fixture.hpp"
-#include "tests/support/golden.hpp"
+#include "tests/rigid_body/book_chain.hpp"
 
 using namespace stance;
 using namespace stance::test;
@@ -35,13 +35,6 @@ Vector6 random_six(Random& random) {
   Vector6 V;
   V << random.vector(2.0), random.vector(2.0);
   return V;
-}
-
-Eigen::Matrix4d homogeneous(const RigidTransform& T) {
-  Eigen::Matrix4d out = Eigen::Matrix4d::Identity();
-  out.topLeftCorner<3, 3>() = T.R;
-  out.topRightCorner<3, 1>() = T.p;
-  return out;
 }
 
 }  // namespace
