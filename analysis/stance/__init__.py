@@ -7,8 +7,8 @@
 
 Modules: `log` reads, `series` holds; `signals`, `metrics`, `estimation` and `walking` measure, `check` judges; `plots`,
 `gait_plots`, `picture`, `walk_picture` and `push_map` draw, `report` writes; `study` asks, `campaign` runs and counts,
-`pushes` and `tick_cpu` tell what its trials had in common, `scoreboard` keeps; `run`, `replay`, `command` and `network`
-speak LCM; `cli` is the command `stance`.
+`pushes` and `tick_cpu` tell what its trials had in common, `scoreboard` keeps; `calibration` fits a camera, `smoother`
+a ball's track; `run`, `replay`, `command` and `network` speak LCM; `cli` is the command `stance`.
 """
 
 from importlib.metadata import version

@@ -270,6 +270,14 @@ def _campaign(options: argparse.Namespace) -> int:
     return GOOD if met else LIMIT_VIOLATED
 
 
+def _calibrate(options: argparse.Namespace) -> int:
+    from .calibration import calibrate, read_points
+
+    result = calibrate(options.kind, *read_points(options.points, options.kind))
+    _print(options, result.as_dict(), result.as_text)
+    return GOOD
+
+
 def _doctor(options: argparse.Namespace) -> int:
     from dataclasses import asdict
 
@@ -457,6 +465,14 @@ def _parser() -> argparse.ArgumentParser:
     shell = add("shell", _shell, "A shell, or a command, in the network of a running `stance run` or `stance replay`.")
     shell.add_argument("--pid", type=int, help="of the process to join (default: the newest)")
     shell.add_argument("words", nargs=argparse.REMAINDER, metavar="COMMAND", help="instead of a shell")
+
+    calibrate = add("calibrate", _calibrate, "Fits where a camera stands against an arm, from pairs of points.")
+    calibrate.add_argument(
+        "points", type=Path, metavar="POINTS.csv", help="columns x_K, y_K, z_K, x_A, y_A, z_A [m]; planar: without z"
+    )
+    calibrate.add_argument(
+        "--kind", choices=("rigid", "affine", "linear", "planar"), default="rigid", help="of the fit (default: rigid)"
+    )
 
     add("doctor", _doctor, "What this machine has and lacks for a run, one line each.")
     return parser
