@@ -32,14 +32,8 @@ RigidTransform exp_se3(const Vector6& V) noexcept {
 
 Vector6 log_se3(const RigidTransform& T) noexcept {
   const Vector3 omega = log_so3(T.R);
-  const double angle2 = omega.squaredNorm();
-  const double half = 0.5 * std::sqrt(angle2);
-  // (1 - h cot h) / (2 h)^2 of the half angle h, by series where it loses digits; h cos h / sin h is well behaved up to
-  // pi.
-  const double d = angle2 < 1e-4 ? 1.0 / 12.0 + angle2 / 720.0 * (1.0 + angle2 / 42.0)
-                                 : (1.0 - half * std::cos(half) / std::sin(half)) / angle2;
   Vector6 V;
-  V << omega, T.p - 0.5 * omega.cross(T.p) + d * omega.cross(omega.cross(T.p));
+  V << omega, left_jacobian_inverse_so3(omega) * T.p;
   return V;
 }
 

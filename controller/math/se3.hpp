@@ -35,6 +35,14 @@ inline Vector6 adjoint_times(const RigidTransform& T, const Vector6& V) noexcept
   return out;
 }
 
+/// Ad_(T^-1) V.
+inline Vector6 adjoint_inverse_times(const RigidTransform& T, const Vector6& V) noexcept {
+  Vector6 out;
+  const Vector3 omega = V.head<3>();
+  out << T.R.transpose() * omega, T.R.transpose() * (V.tail<3>() - T.p.cross(omega));
+  return out;
+}
+
 /// Ad_T^T F: takes a wrench in a to the same wrench in b (MR eq. 3.98).
 inline Vector6 adjoint_transpose_times(const RigidTransform& T, const Vector6& F) noexcept {
   Vector6 out;

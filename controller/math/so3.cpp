@@ -29,6 +29,16 @@ Vector3 log_so3(const Matrix3& R) noexcept {
   return (2.0 * std::atan2(s, q.w()) / s) * q.vec();
 }
 
+Matrix3 left_jacobian_inverse_so3(const Vector3& v) noexcept {
+  const double angle2 = v.squaredNorm();
+  const double half = 0.5 * std::sqrt(angle2);
+  // By series where the quotient loses digits; h cos h / sin h is well behaved up to pi.
+  const double d = angle2 < 1e-4 ? 1.0 / 12.0 + angle2 / 720.0 * (1.0 + angle2 / 42.0)
+                                 : (1.0 - half * std::cos(half) / std::sin(half)) / angle2;
+  const Matrix3 K = skew(v);
+  return Matrix3::Identity() - 0.5 * K + d * K * K;
+}
+
 Matrix3 rotation_from_rpy(const Vector3& rpy) noexcept {
   const double cr = std::cos(rpy.x()), sr = std::sin(rpy.x());
   const double cp = std::cos(rpy.y()), sp = std::sin(rpy.y());

@@ -22,6 +22,11 @@ Matrix3 exp_so3(const Vector3& v) noexcept;
 /// The v with exp_so3(v) = R and |v| <= pi.
 Vector3 log_so3(const Matrix3& R) noexcept;
 
+/// The derivative of the logarithm, and what takes exp_se3's translation to its twist's: log_so3(exp_so3(dv)
+/// exp_so3(v)) = v + J_l^-1(v) dv to first order, J_l^-1 = 1 - [v]x / 2 + d [v]x^2, d = (1 - h cot h) / |v|^2, h = |v|
+/// / 2, for |v| < 2 pi.
+Matrix3 left_jacobian_inverse_so3(const Vector3& v) noexcept;
+
 /// Rz(yaw) Ry(pitch) Rx(roll) of (roll, pitch, yaw) rad.
 Matrix3 rotation_from_rpy(const Vector3& rpy) noexcept;
 

@@ -164,6 +164,7 @@ TEST_CASE("ProductsWithoutMatricesEqualThoseWithThem") {
     const RigidTransform T = random_transform(random);
     const Vector6 V = random_six(random), W = random_six(random);
     CHECK(max_difference(math::adjoint_times(T, V), math::adjoint(T) * V) < kExact);
+    CHECK(max_difference(math::adjoint_inverse_times(T, V), math::adjoint(T.inverse()) * V) < kExact);
     CHECK(max_difference(math::adjoint_transpose_times(T, V), math::adjoint(T).transpose() * V) < kExact);
     CHECK(max_difference(math::lie_bracket_times(V, W), math::lie_bracket(V) * W) < kExact);
     CHECK(max_difference(math::lie_bracket_transpose_times(V, W), math::lie_bracket(V).transpose() * W) < kExact);
@@ -178,6 +179,22 @@ TEST_CASE("LieBracketIsTheDerivativeOfTheAdjoint") {
     const Matrix6 derivative =
         (math::adjoint(math::exp_se3(V * kStep)) - math::adjoint(math::exp_se3(V * -kStep))) / (2.0 * kStep);
     CHECK(max_difference(derivative, math::lie_bracket(V)) < kDifference);
+  }
+}
+
+TEST_CASE("LeftJacobianInverseIsTheDerivativeOfTheLogarithm") {
+  constexpr double kStep = 1e-6, kDifference = 1e-8;
+  Random random(kSeed);
+  for (const double angle : {0.0, 1e-9, 1e-3, 0.00999, 0.01001, 0.5, 1.5, 3.0}) {
+    const Vector3 v = angle * random_direction(random);
+    CAPTURE(angle);
+    const Matrix3 R = math::exp_so3(v);
+    Matrix3 derivative;
+    for (int c = 0; c < 3; ++c) {
+      const Vector3 h = kStep * Vector3::Unit(c);
+      derivative.col(c) = (math::log_so3(math::exp_so3(h) * R) - math::log_so3(math::exp_so3(-h) * R)) / (2.0 * kStep);
+    }
+    CHECK(max_difference(math::left_jacobian_inverse_so3(v), derivative) < kDifference);
   }
 }
 
