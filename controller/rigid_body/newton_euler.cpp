@@ -16,7 +16,7 @@ void newton_euler(const ScrewTree& tree, const JointVector& theta, const JointVe
   for (int i = 0; i < tree.num_joints; ++i) {
     const int parent = tree.parent[i], body = i + 1;
     const Vector6& A = tree.A[i];
-    T[i] = tree.link_from_parent(i, theta(i));                                                          // 8.50
+    T[i] = tree.motion[i](theta(i));                                                                    // 8.50
     V[body] = math::adjoint_times(T[i], V[parent]) + A * thetad(i);                                     // 8.51
     Vd[body] = math::adjoint_times(T[i], Vd[parent]) + math::lie_bracket_times(V[body], A) * thetad(i)  // 8.52
                + A * thetadd(i);

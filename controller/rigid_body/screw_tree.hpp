@@ -8,6 +8,7 @@
 // and turns, slides or does both by its screw A_i, of any norm. Reference: Lynch and Park, Modern Robotics (2017),
 // sections 4.1, 8.3.
 #include <array>
+#include <cmath>
 #include <span>
 
 #include "controller/math/se3.hpp"
@@ -27,15 +28,37 @@ struct SpatialInertia {
   }
 };
 
+/// T_(i,p) of a joint as a sum, all of whose terms but theta's functions are known beforehand:
+///   T = T_0 + sin(w theta) T_s + (1 - cos(w theta)) T_c + theta (0, p_t),   w = |omega| of the screw A = (omega, v)
+/// With k = omega / w: T_0 = M;  T_s = (-[k] R_M, -[k] p_M + [k]^2 v / w);  T_c = ([k]^2 R_M, [k]^2 p_M + [k] v / w);
+/// p_t = -(v + [k]^2 v), the slide along the axis, 0 for a joint that only turns.
+class ScrewMotion {
+ public:
+  ScrewMotion() = default;
+  ScrewMotion(const RigidTransform& M, const Vector6& A) noexcept;
+
+  RigidTransform operator()(double theta) const noexcept {
+    const double sine = std::sin(w_ * theta), versine = 1.0 - std::cos(w_ * theta);
+    return {R_0_ + sine * R_s_ + versine * R_c_, p_0_ + sine * p_s_ + versine * p_c_ + theta * p_t_};
+  }
+
+ private:
+  double w_ = 0.0;
+  Matrix3 R_0_ = Matrix3::Identity(), R_s_ = Matrix3::Zero(), R_c_ = Matrix3::Zero();
+  Vector3 p_0_ = Vector3::Zero(), p_s_ = Vector3::Zero(), p_c_ = Vector3::Zero(), p_t_ = Vector3::Zero();
+};
+
 struct ScrewTree {
   int num_joints = 0;
-  std::array<int, kMaxJoints> parent{};      ///< body index of joint i's parent, at most i
-  std::array<RigidTransform, kMaxJoints> M;  ///< M_(i,p): coordinates in the parent to those in the link, at theta = 0
-  std::array<Vector6, kMaxJoints> A;         ///< joint i's screw in its child link's frame; of any norm
-  std::array<SpatialInertia, kMaxBodies> G;  ///< of the bodies, base first
+  std::array<int, kMaxJoints> parent{};        ///< body index of joint i's parent, at most i
+  std::array<Vector6, kMaxJoints> A;           ///< joint i's screw in its child link's frame; of any norm
+  std::array<ScrewMotion, kMaxJoints> motion;  ///< T_(i,p) of joint i's child link at its angle: 8.50
+  std::array<SpatialInertia, kMaxBodies> G;    ///< of the bodies, base first
 
-  /// T_(i,p) of joint i's child link at its angle theta (8.50): coordinates in the parent to those in the link.
-  RigidTransform link_from_parent(int i, double theta) const noexcept { return math::exp_se3(-theta * A[i]) * M[i]; }
+  /// Adds joint `num_joints` and its link; M = M_(i,p) takes coordinates in the parent to those in the link at theta =
+  /// 0.
+  void add_joint(int parent_body, const RigidTransform& M, const Vector6& screw,
+                 const SpatialInertia& inertia) noexcept;
 };
 
 /// The model's tree with link frames at the centres of mass, axes of the model's link frames.
