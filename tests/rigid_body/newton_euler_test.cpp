@@ -1,47 +1,27 @@
-// The recursion of eqs 8.50-8.54 against reference vectors (40-digit arithmetic). dynamics_test.cpp tests what stands
-// on it.
+// The recursion of eqs 8.50-8.54 and what stands on it for chains, against reference vectors (40-digit arithmetic) and
+// laws. dynamics_test.cpp tests floating bases.
 #include "controller/rigid_body/newton_euler.hpp"
 
 #include <catch2/catch_test_macros.hpp>
 
+#include "controller/rigid_body/chain.hpp"
+#include "controller/rigid_body/chain_dynamics.hpp"
+#include "tests/rigid_body/biped_fixture.hpp"
 #include "tests/rigid_body/book_chain.hpp"
 
 using namespace stance;
 using namespace stance::test;
-using rigid_body::BodySixVectors;
-using rigid_body::ScrewTree;
-using rigid_body::SpatialInertia;
+using namespace stance::rigid_body;
 
 namespace {
 
 constexpr double kGolden = 1e-10;  ///< relative to 1 + the largest entry
 
-/// An open chain in the book's convention: M_(i-1,i), G_i and space screws S_i.
-struct Chain {
-  ScrewTree tree;
-  RigidTransform M_tip;  ///< M_(n+1,n)
-
-  explicit Chain(const YAML::Node& file) : Chain(read_book_chain(file)) {}
-  explicit Chain(const BookChain& book) : tree(book.tree()), M_tip(book.M.back().inverse()) {}
-
-  Eigen::VectorXd torques(const Eigen::VectorXd& theta, const Eigen::VectorXd& thetad, const Eigen::VectorXd& thetadd,
-                          const Vector3& g, const Vector6& F_tip) const {
-    const auto full = [](const Eigen::VectorXd& v) {
-      JointVector out = JointVector::Zero();
-      out.head(v.size()) = v;
-      return out;
-    };
-    Vector6 Vd_0, F_0;
-    Vd_0 << Vector3::Zero(), -g;
-    BodySixVectors F_out;
-    F_out.fill(Vector6::Zero());
-    // The book's last link carries a frame n + 1 at its tip.
-    F_out[tree.num_joints] = math::adjoint_transpose_times(M_tip, F_tip);
-    JointVector tau;
-    rigid_body::newton_euler(tree, full(theta), full(thetad), full(thetadd), Vector6::Zero(), Vd_0, F_out, F_0, tau);
-    return tau.head(tree.num_joints);
-  }
-};
+JointVector full(const Eigen::VectorXd& v) {
+  JointVector out = JointVector::Zero();
+  out.head(v.size()) = v;
+  return out;
+}
 
 void check_close(const Eigen::MatrixXd& value, const Eigen::MatrixXd& expected) {
   CHECK(max_difference(value, expected) <= kGolden * (1.0 + expected.cwiseAbs().maxCoeff()));
@@ -49,26 +29,32 @@ void check_close(const Eigen::MatrixXd& value, const Eigen::MatrixXd& expected) 
 
 void check_chain(const std::string& file_name) {
   const YAML::Node file = load_golden(file_name);
-  const Chain chain(file);
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(chain.tree.num_joints);
+  const BookChain book = read_book_chain(file);
+  const ScrewTree tree = book.tree();
+  const int n = tree.num_joints;
+  const JointVector zero = JointVector::Zero();
   for (const YAML::Node& c : golden_cases(file)) {
-    const Eigen::VectorXd theta = golden_vector(c, "theta"), thetad = golden_vector(c, "dtheta"),
-                          thetadd = golden_vector(c, "ddtheta");
-    const Vector3 g = golden_vector<3>(c, "g");
-    const Vector6 F_tip = golden_vector<6>(c, "Ftip");
-    const Vector6 no_wrench = Vector6::Zero();
-    check_close(chain.torques(theta, thetad, thetadd, g, F_tip), golden_vector(c, "tau"));
-    check_close(chain.torques(theta, thetad, zero, Vector3::Zero(), no_wrench), golden_vector(c, "c"));
-    check_close(chain.torques(theta, zero, zero, g, no_wrench), golden_vector(c, "grav"));
-    check_close(chain.torques(theta, zero, zero, Vector3::Zero(), F_tip), golden_vector(c, "JTF"));
-    Eigen::MatrixXd M(zero.size(), zero.size());
-    for (int j = 0; j < M.cols(); ++j) {
-      M.col(j) = chain.torques(theta, zero, Eigen::VectorXd::Unit(M.cols(), j), Vector3::Zero(), no_wrench);
-    }
+    const JointVector theta = full(golden_vector(c, "theta")), thetad = full(golden_vector(c, "dtheta")),
+                      thetadd = full(golden_vector(c, "ddtheta"));
+    const Load load{golden_vector<3>(c, "g"), book.tip(), golden_vector<6>(c, "Ftip")};
+    const Load none{Vector3::Zero(), book.tip(), Vector6::Zero()};
+    const Load wrench{Vector3::Zero(), book.tip(), load.F_tip};
+    const JointVector tau = inverse_dynamics(tree, theta, thetad, thetadd, load);
+    check_close(tau.head(n), golden_vector(c, "tau"));
+    check_close(inverse_dynamics(tree, theta, thetad, zero, none).head(n), golden_vector(c, "c"));
+    check_close(inverse_dynamics(tree, theta, zero, zero, wrench).head(n), golden_vector(c, "JTF"));
+    check_close(joint_gravity(tree, theta, load.gravity).head(n), golden_vector(c, "grav"));
+    JointMatrix M, C;
+    joint_mass_matrix(tree, theta, M);
     check_close(M, golden_matrix(c, "M"));
-    // The recursion is affine in the accelerations, so this inverts it.
-    const Eigen::VectorXd bias = chain.torques(theta, thetad, zero, g, F_tip);
-    check_close(M.ldlt().solve(golden_vector(c, "tau") - bias), golden_vector(c, "ddtheta_fd"));
+    coriolis_matrix(tree, theta, thetad, C);
+    check_close(C * thetad.head(n), golden_vector(c, "c"));
+    JointVector found;
+    REQUIRE(forward_dynamics(tree, theta, thetad, full(golden_vector(c, "tau")), load, found));
+    check_close(found.head(n), golden_vector(c, "ddtheta_fd"));
+    JointJacobian J_b;
+    body_jacobian(tree, book.tip(), theta, J_b);
+    check_close(J_b.transpose() * load.F_tip, golden_vector(c, "JTF"));
   }
 }
 
@@ -89,7 +75,7 @@ TEST_CASE("NewtonEulerOfASingleBodyIsItsWrenchAtTheCentreOfMass") {
     Vd << golden_vector<3>(c, "omega_dot"), golden_vector<3>(c, "v_dot");
     expected << golden_vector<3>(c, "moment"), golden_vector<3>(c, "force");
     const SpatialInertia G{golden_matrix<3, 3>(c, "I"), golden_number(c, "m")};
-    check_close(rigid_body::single_body_wrench(G, V, Vd), expected);
+    check_close(single_body_wrench(G, V, Vd), expected);
 
     // The recursion over a tree of one body says the same.
     ScrewTree body;
@@ -99,7 +85,53 @@ TEST_CASE("NewtonEulerOfASingleBodyIsItsWrenchAtTheCentreOfMass") {
     F_out.fill(Vector6::Zero());
     JointVector tau;
     Vector6 F;
-    rigid_body::newton_euler(body, none, none, none, V, Vd, F_out, F, tau);
+    newton_euler(body, none, none, none, V, Vd, F_out, F, tau);
     check_close(F, expected);
   }
+}
+
+TEST_CASE("RateOfTheMassMatrixLessTwiceTheCoriolisMatrixIsSkew") {
+  constexpr double kStep = 1e-6, kDifference = 1e-7;
+  const Model models[] = {Biped().model, skew_tree()};
+  for (const Model& model : models) {
+    const ScrewTree tree = screw_tree(model);
+    const int n = tree.num_joints;
+    Random random(47);
+    for (int k = 0; k < 30; ++k) {
+      const State state = random_state(model, random);
+      JointMatrix before, after, C;
+      joint_mass_matrix(tree, state.q - kStep * state.qd, before);
+      joint_mass_matrix(tree, state.q + kStep * state.qd, after);
+      coriolis_matrix(tree, state.q, state.qd, C);
+      const JointMatrix N = (after - before) / (2.0 * kStep) - 2.0 * C;
+      CHECK(max_difference(N, -N.transpose()) < kDifference);
+      const Load none{Vector3::Zero(), {}, Vector6::Zero()};
+      check_close(C * state.qd.head(n), inverse_dynamics(tree, state.q, state.qd, JointVector::Zero(), none).head(n));
+    }
+  }
+}
+
+TEST_CASE("MassMatrixOfTheScrewsIsTheJointsBlockOfTheModels") {
+  const Model models[] = {Biped().model, skew_tree()};
+  for (const Model& model : models) {
+    const ScrewTree tree = screw_tree(model);
+    Random random(53);
+    for (int k = 0; k < 30; ++k) {
+      const State state = random_state(model, random);
+      JointMatrix M;
+      joint_mass_matrix(tree, state.q, M);
+      MatrixNu whole;
+      mass_matrix(model, state, whole);
+      check_close(M, whole.bottomRightCorner(model.num_joints, model.num_joints));
+    }
+  }
+}
+
+TEST_CASE("ForwardDynamicsOfAJointThatMovesNoMassIsRefused") {
+  ScrewTree tree = screw_tree(skew_tree());
+  tree.G.fill({});
+  JointVector thetadd = JointVector::Ones();
+  const JointVector zero = JointVector::Zero();
+  CHECK(!forward_dynamics(tree, zero, zero, JointVector::Ones(), {}, thetadd));
+  CHECK(thetadd == zero);
 }
