@@ -3,6 +3,8 @@
 #include <cstddef>
 #include <vector>
 
+#include "controller/rigid_body/chain_dynamics.hpp"
+#include "controller/rigid_body/inverse_kinematics.hpp"
 #include "tests/rigid_body/biped_fixture.hpp"
 #include "tests/support/heap_calls.hpp"
 
@@ -16,6 +18,37 @@ TEST_CASE("HeapCallsAreCounted") {
   const std::vector<double> block(size);
   CHECK(block.size() == size);
   CHECK(heap_calls > before);
+}
+
+TEST_CASE("ChainsDoNotAllocate") {
+  const Biped biped;
+  Random random(7);
+  const State state = random_state(biped.model, random);
+  const ScrewTree tree = screw_tree(biped.model);
+  const Tip tip = tip_on_link(biped.model, 4, {});
+  PoseTask task;
+  task.posture_weight.setOnes();
+  task.weight << 0, 0, 0, 1, 1, 1;
+  const JointVector seed = JointVector::Constant(0.2);
+  task.target = tip_pose(tree, tip, 1.5 * seed);
+
+  const long before = heap_calls;
+  JointJacobian J;
+  space_jacobian(tree, tip, state.q, J);
+  const Vector6 V = J * state.qd;
+  const auto least = inverse_velocity(J, V);
+  const auto damped = inverse_velocity(J, V, 0.1);
+  JointMatrix M, C;
+  joint_mass_matrix(tree, state.q, M);
+  coriolis_matrix(tree, state.q, state.qd, C);
+  JointVector thetadd;
+  const bool moved = forward_dynamics(tree, state.q, state.qd, state.q, {}, thetadd);
+  const InverseKinematics found = inverse_kinematics(tree, tip, task, joint_limits(biped.model), {&seed, 1});
+  const long after = heap_calls;
+
+  CHECK(after == before);
+  CHECK((moved && least.allFinite() && damped.allFinite() && C.allFinite()));
+  CHECK(found.status == InverseKinematicsStatus::kReached);
 }
 
 TEST_CASE("KinematicsAndDynamicsDoNotAllocate") {
