@@ -1,6 +1,7 @@
 // The estimator's step takes no memory: malloc itself is watched, since Eigen's own guard sees only Eigen.
 #include <catch2/catch_test_macros.hpp>
 
+#include "controller/estimation/ball_filter.hpp"
 #include "tests/estimation/simulated_robot.hpp"
 #include "tests/support/heap_calls.hpp"
 
@@ -42,6 +43,20 @@ TEST_CASE("StepTakesNoMemory") {
     calls += heap_calls - before;
   }
   CHECK(calls == 0);
+}
+
+TEST_CASE("BallFilterTakesNoMemory") {
+  BallFilterConfig config;
+  config.measurement_sigma = 0.01;
+  config.velocity_sigma = 4.0;
+  config.drag_sigma = 0.015;
+  BallFilter<7> filter(config);
+  const long before = heap_calls;
+  for (int k = 0; k < 50; ++k) filter.step(0.01, Vector3(3.0 - 0.04 * k, 0.0, 1.0));
+  const auto ahead = filter.predict(0.3);
+  const long calls = heap_calls - before;
+  CHECK(calls == 0);
+  CHECK(ahead.x.allFinite());
 }
 
 }  // namespace stance::estimation::test
