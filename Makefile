@@ -8,7 +8,7 @@ PYTHON := .venv/bin/python
 STUDIES ?= $(notdir $(basename $(wildcard sim/scenarios/$(ROBOT)/studies/*.yaml)))
 CPP = $$(find controller sim rollout tests -name '*.[ch]pp')
 
-.PHONY: help setup build programs test demo check check-asan check-tsan check-debug lint bench format lock clean studies
+.PHONY: help setup peers build programs test demo check check-asan check-tsan check-debug lint bench format lock clean studies
 
 help:
 	@echo "make demo    $(ROBOT) in scenario '$(SCENARIO)' over LCM: log, report, plots, verdict (ROBOT=..., SCENARIO=...)"
@@ -20,6 +20,10 @@ help:
 setup:
 	@setup/setup.sh
 
+# The libraries that tests/peers compares the rigid-body core with.
+peers: setup
+	@setup/setup.sh peers
+
 build: TARGET = all
 programs: TARGET = programs
 build programs: setup
@@ -27,7 +31,7 @@ build programs: setup
 	@rm -f build-$(PRESET).log
 	@cmake --build --preset $(PRESET) --parallel $(JOBS) --target $(TARGET)
 
-test: build
+test: build peers
 	ctest --preset $(PRESET)
 	$(PYTHON) -m pytest
 
@@ -61,10 +65,12 @@ format:
 	.venv/bin/clang-format -i $(CPP)
 	.venv/bin/ruff format analysis tests
 
-# Resolves setup/python.in anew; needs `uv` and the network.
+# Resolves setup/python.in and setup/peers.in anew; needs `uv` and the network.
+RESOLVE = uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
+  --no-emit-find-links --no-header --no-annotate
 lock:
-	uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url --no-emit-find-links \
-	  --no-header --no-annotate setup/python.in -o setup/python.lock
+	$(RESOLVE) setup/python.in -o setup/python.lock
+	$(RESOLVE) --constraints setup/python.lock setup/peers.in -o setup/peers.lock
 
 clean:
 	rm -rf build runs

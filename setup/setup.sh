@@ -91,6 +91,12 @@ install_package() {
   .venv/bin/pip install -q --disable-pip-version-check --no-deps --no-build-isolation --editable . || fail "pip could not install the package 'stance' of pyproject.toml"
 }
 
+# What the rigid-body core is compared with and timed beside: setup.sh peers.
+install_peers() {
+  say "installing the pinned packages of setup/peers.lock"
+  .venv/bin/pip install -q --disable-pip-version-check --require-hashes -r setup/peers.lock || fail "pip could not install setup/peers.lock: check the network"
+}
+
 # ---- OSQP and QDLDL, vendored from pinned source ------------------------------------------------------------------
 . setup/vendor.pins
 # One hash over every file's path and content, in a fixed order.
@@ -121,7 +127,8 @@ vendor_qdldl() {
 }
 
 install_debian
-done_before python setup/python.lock && [ -x .venv/bin/python ] || { install_python; mark_done python setup/python.lock; rm -f .setup/package; }
+done_before python setup/python.lock && [ -x .venv/bin/python ] || { install_python; mark_done python setup/python.lock; rm -f .setup/package .setup/peers; }
 done_before package pyproject.toml || { install_package; mark_done package pyproject.toml; }
 done_before osqp setup/vendor.pins && [ -d "${STANCE_OSQP_SOURCE_DIR:-third_party/osqp}" ] || { vendor_osqp; mark_done osqp setup/vendor.pins; }
 done_before qdldl setup/vendor.pins && [ -d third_party/qdldl ] || { vendor_qdldl; mark_done qdldl setup/vendor.pins; }
+[ "${1:-}" != peers ] || done_before peers setup/peers.lock || { install_peers; mark_done peers setup/peers.lock; }
