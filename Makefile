@@ -50,8 +50,11 @@ check-debug check-asan check-tsan: check-%:
 	@$(MAKE) --no-print-directory build PRESET=$*
 	ctest --preset $*
 
-bench: build
+bench: peers
+	@$(MAKE) --no-print-directory build
+	@cmake --build --preset release --parallel $(JOBS) --target bench_rigid_body
 	build/release/bin/bench_force_qp
+	build/release/bin/bench_rigid_body
 	$(PYTHON) tests/bench/tick.py
 
 # Every study, on seeds that no tuning has seen; the README's table is drawn from what they come to. TRIALS of each cell, else
