@@ -4,6 +4,7 @@
 #include <array>
 
 #include "controller/rigid_body/chain.hpp"
+#include "controller/rigid_body/composite_inertia.hpp"
 
 namespace stance::rigid_body {
 namespace {
@@ -39,15 +40,23 @@ JointVector inverse_dynamics(const ScrewTree& tree, const JointVector& theta, co
 }
 
 void joint_mass_matrix(const ScrewTree& tree, const JointVector& theta, JointMatrix& M) noexcept {
-  LinkJacobians J;
-  M.setZero(tree.num_joints, tree.num_joints);
+  std::array<RigidTransform, kMaxJoints> T;
+  std::array<CompositeInertia, kMaxBodies> composite;
   for (int i = 0; i < tree.num_joints; ++i) {
-    carry_over(tree, i, tree.motion[i](theta(i)), J);
-    J[i].col(i) = tree.A[i];
-    for (int c = 0; c <= i; ++c) {
-      const Vector6 momentum = tree.G[i + 1] * J[i].col(c);
-      for (int r = 0; r <= c; ++r) M(r, c) += J[i].col(r).dot(momentum);
+    T[i] = tree.motion[i](theta(i));
+    composite[i + 1] = {tree.G[i + 1].mass, Vector3::Zero(), tree.G[i + 1].inertia};
+  }
+  // Joints on different branches do not feel each other.
+  M.setZero(tree.num_joints, tree.num_joints);
+  for (int i = tree.num_joints - 1; i >= 0; --i) {
+    const CompositeInertia& carried = composite[i + 1];
+    Vector6 F = carried.momentum(tree.A[i].head<3>(), tree.A[i].tail<3>());
+    for (int j = i;; j = tree.parent[j] - 1) {
+      M(j, i) = tree.A[j].dot(F);
+      if (tree.parent[j] == 0) break;
+      F = math::adjoint_transpose_times(T[j], F);
     }
+    if (tree.parent[i] > 0) composite[tree.parent[i]] += carried_back(T[i], carried);
   }
   M.triangularView<Eigen::StrictlyLower>() = M.transpose();
 }

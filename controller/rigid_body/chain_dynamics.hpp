@@ -6,10 +6,12 @@
 // With J_i the body Jacobian of link i's frame, from J_i = Ad_(T_(i,p)) J_p and A_i in joint i's column:
 //   M = sum_i J_i^T G_i J_i                                                                               (8.57)
 //   C = sum_i J_i^T (G_i Jd_i + [G_i V_i] J_i),   [(m, f)] = -[[m]x [f]x; [f]x 0],   [G V] V = -ad_V^T G V
-// [G V] is skew, so that Md - 2 C is, too: the joints' inner forces do no work.
-// References: Lynch and Park, Modern Robotics (2017), sections 8.3 to 8.5; for C, Echeandia and Wensing, Numerical
-// methods to compute the Coriolis matrix and Christoffel symbols for rigid-body systems, J. Comput. Nonlinear Dyn. 16
-// (2021).
+// M comes by composite bodies: M_ji = A_j^T F_i, F_i the momentum, taken to link j, of all that joint i carries when it
+// alone turns. [G V] is skew, so that Md - 2 C is, too: the joints' inner forces do no work.
+//
+// References: Lynch and Park, Modern Robotics (2017), sections 8.3 to 8.5; Featherstone, Rigid Body Dynamics Algorithms
+// (2008), section 6.2, for M; for C, Echeandia and Wensing, Numerical methods to compute the Coriolis matrix and
+// Christoffel symbols for rigid-body systems, J. Comput. Nonlinear Dyn. 16 (2021).
 #include <Eigen/Core>
 
 #include "controller/rigid_body/newton_euler.hpp"

@@ -2,19 +2,13 @@
 
 #include <Eigen/QR>
 
+#include "controller/rigid_body/composite_inertia.hpp"
 #include "controller/rigid_body/newton_euler.hpp"
 
 namespace stance::rigid_body {
 namespace {
 
-/// The spatial inertia of a set of bodies about B's origin, axes of W.
-struct CompositeInertia {
-  double mass = 0.0;                  ///< kg
-  Vector3 moment = Vector3::Zero();   ///< kg m, mass times centre of mass
-  Matrix3 inertia = Matrix3::Zero();  ///< kg m^2
-};
-
-/// Of each body together with all that hangs on it.
+/// Of each body together with all that hangs on it, about B's origin, axes of W.
 std::array<CompositeInertia, kMaxBodies> composite_inertias(const Model& model, const Kinematics& kinematics) noexcept {
   std::array<CompositeInertia, kMaxBodies> composite;
   for (int b = model.num_bodies() - 1; b >= 0; --b) {
@@ -28,10 +22,7 @@ std::array<CompositeInertia, kMaxBodies> composite_inertias(const Model& model, 
     own.inertia.diagonal().array() += body.mass * r.squaredNorm();
     own.inertia -= body.mass * r * r.transpose();
     if (b == 0) break;
-    CompositeInertia& parent = composite[model.joints[b - 1].parent];
-    parent.mass += own.mass;
-    parent.moment += own.moment;
-    parent.inertia += own.inertia;
+    composite[model.joints[b - 1].parent] += own;
   }
   return composite;
 }
@@ -51,7 +42,7 @@ void momentum_matrix(const Model& model, const Kinematics& kinematics,
     const Vector3& axis = kinematics.axis_W[i];
     // Velocity, at B's origin, of a body that turns about the joint.
     const Vector3 v = (kinematics.p_W[i + 1] - kinematics.p_W[0]).cross(axis);
-    H.col(6 + i) << carried.inertia * axis + carried.moment.cross(v), carried.mass * v + axis.cross(carried.moment);
+    H.col(6 + i) = carried.momentum(axis, v);
   }
 }
 
