@@ -5,6 +5,7 @@
 #include <stdexcept>
 
 #include "controller/force_qp/osqp_engine.hpp"
+#include "controller/force_qp/structured/structured.hpp"
 
 namespace stance::force_qp {
 namespace {
@@ -59,9 +60,9 @@ std::unique_ptr<ForceQp> make_force_qp(const Settings& settings, Sizes sizes, do
     case QpEngine::kOsqpSparse:
       return make_osqp_engine(settings, sizes, typical_force);
     case QpEngine::kStructured:
-      break;
+      return make_structured_engine(settings, sizes, typical_force);
   }
-  throw std::invalid_argument("force_qp: engine = structured is not available");
+  throw std::invalid_argument("force_qp: engine is none of QpEngine");
 }
 
 }  // namespace stance::force_qp

@@ -23,7 +23,7 @@ TEST_CASE("HeapCallsAreCounted") {
 }
 
 TEST_CASE("ASolveAllocatesNothing") {
-  for (const QpEngine which : {QpEngine::kOsqpCondensed, QpEngine::kOsqpSparse}) {
+  for (const QpEngine which : {QpEngine::kOsqpCondensed, QpEngine::kOsqpSparse, QpEngine::kStructured}) {
     for (const int num_contacts : {1, 2, 3, 4}) {
       Settings settings;
       settings.engine = which;

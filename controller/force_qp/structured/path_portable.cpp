@@ -1,0 +1,20 @@
+#include "controller/force_qp/structured/paths.hpp"
+// The path first, then what is made of it:
+// clang-format off
+#include "controller/force_qp/structured/simd_portable.hpp"
+#include "controller/force_qp/structured/simd.hpp"
+#include "controller/force_qp/structured/kernels.hpp"
+// clang-format on
+
+namespace stance::force_qp::structured {
+
+template <int NC>
+const Path<NC>& path_portable() noexcept {
+  static constexpr Path<NC> kPath = STANCE_ISA::path<NC>();
+  return kPath;
+}
+template const Path<1>& path_portable<1>() noexcept;
+template const Path<2>& path_portable<2>() noexcept;
+template const Path<4>& path_portable<4>() noexcept;
+
+}  // namespace stance::force_qp::structured

@@ -1,0 +1,73 @@
+#pragma once
+// Eight lanes in plain C++: what the other paths compute, bit for bit, on any machine. See simd.hpp for the meaning.
+#include <cmath>
+
+#define STANCE_ISA portable
+
+namespace stance::force_qp::structured::STANCE_ISA {
+
+struct Vec {
+  double v[8];
+};
+
+template <typename F>
+inline Vec lanewise(F f) noexcept {
+  Vec r;
+  for (int i = 0; i < 8; ++i) r.v[i] = f(i);
+  return r;
+}
+
+inline Vec load(const double* from) noexcept {
+  return lanewise([&](int i) { return from[i]; });
+}
+inline void store(double* to, const Vec& a) noexcept {
+  for (int i = 0; i < 8; ++i) to[i] = a.v[i];
+}
+inline Vec all(double x) noexcept {
+  return lanewise([&](int) { return x; });
+}
+inline Vec operator+(const Vec& a, const Vec& b) noexcept {
+  return lanewise([&](int i) { return a.v[i] + b.v[i]; });
+}
+inline Vec operator-(const Vec& a, const Vec& b) noexcept {
+  return lanewise([&](int i) { return a.v[i] - b.v[i]; });
+}
+inline Vec operator*(const Vec& a, const Vec& b) noexcept {
+  return lanewise([&](int i) { return a.v[i] * b.v[i]; });
+}
+inline Vec add_product(const Vec& c, const Vec& a, const Vec& b) noexcept {
+  return lanewise([&](int i) { return std::fma(a.v[i], b.v[i], c.v[i]); });
+}
+inline Vec subtract_product(const Vec& c, const Vec& a, const Vec& b) noexcept {
+  return lanewise([&](int i) { return std::fma(-a.v[i], b.v[i], c.v[i]); });
+}
+inline Vec larger(const Vec& a, const Vec& b) noexcept {
+  return lanewise([&](int i) { return a.v[i] > b.v[i] ? a.v[i] : b.v[i]; });
+}
+inline Vec magnitude(const Vec& a) noexcept {
+  return lanewise([&](int i) { return std::fabs(a.v[i]); });
+}
+template <int J>
+inline Vec lane(const Vec& a) noexcept {
+  return all(a.v[J]);
+}
+template <int J>
+inline Vec lane_of_halves(const Vec& a) noexcept {
+  return lanewise([&](int i) { return a.v[i / 4 * 4 + J]; });
+}
+inline Vec swap_halves(const Vec& a) noexcept {
+  return lanewise([&](int i) { return a.v[i ^ 4]; });
+}
+inline Vec low_halves(const Vec& a, const Vec& b) noexcept {
+  return lanewise([&](int i) { return i < 4 ? a.v[i] : b.v[i - 4]; });
+}
+inline Vec high_halves(const Vec& a, const Vec& b) noexcept {
+  return lanewise([&](int i) { return i < 4 ? a.v[4 + i] : b.v[i]; });
+}
+inline void transpose_halves(Vec (&a)[4]) noexcept {
+  Vec t[4];
+  for (int i = 0; i < 4; ++i) t[i] = lanewise([&](int j) { return a[j % 4].v[j / 4 * 4 + i]; });
+  for (int i = 0; i < 4; ++i) a[i] = t[i];
+}
+
+}  // namespace stance::force_qp::structured::STANCE_ISA

@@ -1,0 +1,420 @@
+#include "controller/force_qp/structured/structured.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "controller/force_qp/inspect.hpp"
+#include "controller/force_qp/kkt.hpp"
+#include "controller/force_qp/structured/paths.hpp"
+
+namespace stance::force_qp {
+namespace structured {
+namespace {
+
+constexpr double kTolerance = 1e-10;  // of a violation that counts as none, relative to the typical force
+constexpr int kMaxColumns = 1024;     // that are kept, and constraints that may be active
+
+constexpr int padded(int count) { return (count + 7) / 8 * 8; }
+
+/// A row of doubles, aligned as Lanes.
+class Numbers {
+ public:
+  explicit Numbers(std::size_t count) : lanes_((count + 7) / 8, Lanes{}) {}
+  double* data() { return lanes_.front().v; }
+
+ private:
+  std::vector<Lanes> lanes_;
+};
+
+template <int NC>
+const Path<NC>& path_of(Simd simd) {
+  switch (simd) {
+#ifdef STANCE_X86
+    case Simd::kAvx512:
+      return path_avx512<NC>();
+    case Simd::kAvx2:
+      return path_avx2<NC>();
+#endif
+    default:
+      return path_portable<NC>();
+  }
+}
+
+void put(Lanes& to, const Vector3& low, const Vector3& high) noexcept {
+  for (int i = 0; i < 3; ++i) {
+    to.v[i] = low[i];
+    to.v[4 + i] = high[i];
+  }
+}
+template <typename Twelve>
+void put_state(Lanes& pose, Lanes& rate, const Twelve& x) noexcept {
+  put(pose, x.template segment<3>(0), x.template segment<3>(3));
+  put(rate, x.template segment<3>(6), x.template segment<3>(9));
+}
+
+template <int NC>
+class Solver final : public StructuredSolver {
+ public:
+  Solver(Sizes sizes, double typical_force, int max_iterations, Simd simd)
+      : sizes_(sizes),
+        path_(path_of<NC>(simd)),
+        max_rows_(static_cast<std::size_t>(padded(sizes.num_stages * NC))),
+        max_columns_(std::min(kFaces * max_rows_, static_cast<std::size_t>(kMaxColumns))),
+        max_active_(std::min(3 * max_rows_, max_columns_)),
+        stages_(num_stages(), Stage<NC>{}),
+        gains_(num_stages(), Gain<NC>{}),
+        states_(2 * num_stages(), Lanes{}),
+        feedforward_(num_stages() * Stage<NC>::kPairs, Lanes{}),
+        eight_forces_(3 * max_rows_, Lanes{}),
+        eight_feedforward_(num_stages() * 3 * NC, Lanes{}),
+        row_numbers_(3 * max_rows_),
+        force_numbers_(6 * max_rows_),
+        columns_(max_columns_ * 3 * max_rows_),
+        set_numbers_(5 * stride()),
+        L_inverse_((max_active_ + 8) * stride()),
+        columns_of_set_(max_active_ + 1, nullptr),
+        row_stage_(max_rows_, 0),
+        constraint_column_(kFaces * max_rows_, -1),
+        column_constraint_(max_columns_, 0),
+        set_constraint_(max_active_ + 1, 0),
+        candidates_(kFaces * max_rows_, 0),
+        guesses_(kFaces * max_rows_, 0),
+        is_active_(kFaces * max_rows_, 0),
+        active_in_row_(max_rows_, 0),
+        contact_of_slot_(num_stages()),
+        start_(num_stages(), 0.0),
+        duration_(num_stages(), 0.0),
+        remembered_(num_stages()),
+        remembered_end_(num_stages(), 0.0) {
+    Workspace<NC>& w = w_;
+    w.num_stages = sizes.num_stages;
+    w.tolerance = kTolerance * typical_force;
+    w.max_iterations = max_iterations;
+    w.stages = stages_.data();
+    w.gains = gains_.data();
+    w.row_stage = row_stage_.data();
+    w.fz_min = row_numbers_.data();
+    w.fz_max = w.fz_min + max_rows_;
+    w.violation = w.fz_max + max_rows_;
+    w.z_pose = states_.data();
+    w.z_rate = w.z_pose + num_stages();
+    w.feedforward = feedforward_.data();
+    w.max_columns = static_cast<int>(max_columns_);
+    w.column_of = constraint_column_.data();
+    w.column_constraint = column_constraint_.data();
+    w.columns = columns_.data();
+    w.eight_forces = eight_forces_.data();
+    w.eight_feedforward = eight_feedforward_.data();
+    w.max_active = static_cast<int>(max_active_);
+    w.stride = static_cast<int>(stride());
+    w.constraint = set_constraint_.data();
+    w.multiplier = set_numbers_.data();
+    w.excess = w.multiplier + stride();
+    w.right = w.excess + stride();
+    w.half = w.right + stride();
+    w.direction = w.half + stride();
+    w.column = columns_of_set_.data();
+    w.is_active = is_active_.data();
+    w.active_in_row = active_in_row_.data();
+    w.L_inverse = L_inverse_.data();
+    w.free_forces = force_numbers_.data();
+    w.forces = w.free_forces + 3 * max_rows_;
+    w.candidates = candidates_.data();
+    w.guesses = guesses_.data();
+  }
+
+  bool take_matrices(const Problem& problem) noexcept override {
+    Workspace<NC>& w = w_;
+    w.friction = problem.friction;
+    int row = 0;
+    double time = 0.0;
+    for (std::size_t k = 0; k < num_stages(); ++k) {
+      take_stage(problem.stages[k], k, row);
+      for (int slot = 0; slot < w.stages[k].slots; ++slot) w.row_stage[row++] = static_cast<int>(k);
+      start_[k] = time;
+      duration_[k] = problem.stages[k].dynamics.A(3, 9);
+      time += duration_[k];
+    }
+    w.rows = row;
+    w.padded_rows = padded(row);
+    for (; row < w.padded_rows; ++row) {
+      w.fz_min[row] = w.fz_max[row] = 0.0;
+      for (int d = 0; d < 3; ++d) w.free_forces[d * w.padded_rows + row] = w.forces[d * w.padded_rows + row] = 0.0;
+    }
+    take_terminal_cost(problem);
+    return path_.factor(w);
+  }
+
+  void take_vectors(const Problem& problem) noexcept override {
+    put_state(w_.x0_pose, w_.x0_rate, problem.x0);
+    for (std::size_t k = 0; k < num_stages(); ++k) {
+      const StageData& data = problem.stages[k];
+      Stage<NC>& s = stages_[k];
+      put_state(s.g_pose, s.g_rate, data.dynamics.g);
+      put_state(s.x_ref_pose, s.x_ref_rate, data.x_ref);
+      for (int slot = 0; slot < s.slots; ++slot) {
+        const int contact = contact_of_slot_[k][static_cast<std::size_t>(slot)];
+        for (int d = 0; d < 3; ++d) {
+          s.f_ref[slot / 2].v[slot % 2 * 4 + d] = contact < 0 ? 0.0 : data.f_ref[3 * contact + d];
+        }
+      }
+    }
+  }
+
+  QpStatus solve() noexcept override {
+    guess();
+    const Outcome outcome = path_.solve(w_);
+    if (outcome != Outcome::kSolved) {
+      reset();
+      return QpStatus::kMaxIterations;
+    }
+    remember();
+    return QpStatus::kSolved;
+  }
+
+  void refine() noexcept override { path_.refine(w_); }
+  void take_ahead() noexcept override { path_.take_ahead(w_); }
+  int iterations() const noexcept override { return w_.iterations; }
+  int active() const noexcept override { return w_.active; }
+
+  void forces(std::vector<ForceVector>& out) const noexcept override {
+    for (std::size_t k = 0; k < num_stages(); ++k) {
+      out[k].setZero();
+      for (int slot = 0; slot < stages_[k].slots; ++slot) {
+        const int contact = contact_of_slot_[k][static_cast<std::size_t>(slot)];
+        if (contact < 0) continue;
+        for (int d = 0; d < 3; ++d) {
+          out[k][3 * contact + d] = w_.forces[d * w_.padded_rows + stages_[k].first_row + slot];
+        }
+      }
+    }
+  }
+
+  void reset() noexcept override {
+    for (auto& stage : remembered_) stage.fill(0);
+    any_remembered_ = false;
+  }
+
+ private:
+  std::size_t num_stages() const { return static_cast<std::size_t>(sizes_.num_stages); }
+  std::size_t stride() const { return (max_active_ + 7) / 8 * 8 + 8; }
+
+  void take_stage(const StageData& data, std::size_t k, int first_row) noexcept {
+    Stage<NC>& s = stages_[k];
+    auto& contacts = contact_of_slot_[k];
+    contacts.fill(-1);
+    int stance = 0;
+    for (int contact = 0; contact < sizes_.num_contacts; ++contact) {
+      if (data.fz_max[static_cast<std::size_t>(contact)] > 0.0) contacts[static_cast<std::size_t>(stance++)] = contact;
+    }
+    s.slots = stance <= 1 ? 1 : stance == 2 ? 2 : 4;
+    s.first_row = first_row;
+
+    const Dynamics& dynamics = data.dynamics;
+    s.coupled = !dynamics.A.block<3, 3>(6, 3).isZero(0.0);
+    for (int j = 0; j < 3; ++j) {
+      put(s.D[j], dynamics.A.block<3, 1>(0, 6 + j), dynamics.A.block<3, 1>(3, 9 + j));
+      put(s.C[j], dynamics.A.block<3, 1>(6, 3 + j), Vector3::Zero());
+    }
+    for (int slot = 0; slot < s.slots; ++slot) {
+      const int contact = contacts[static_cast<std::size_t>(slot)];
+      const auto bounds = static_cast<std::size_t>(contact);
+      for (int d = 0; d < 3; ++d) {
+        Lanes& column = s.B[3 * slot + d];
+        s.R[3 * slot + d] = contact < 0 ? 1.0 : data.R[3 * contact + d];
+        if (contact < 0) {
+          column = Lanes{};
+        } else {
+          put(column, dynamics.B.block<3, 1>(6, 3 * contact + d), dynamics.B.block<3, 1>(9, 3 * contact + d));
+        }
+      }
+      w_.fz_min[first_row + slot] = contact < 0 ? 0.0 : std::max(data.fz_min[bounds], 0.0);
+      w_.fz_max[first_row + slot] = contact < 0 ? 0.0 : data.fz_max[bounds];
+    }
+    put_state(s.Q_pose, s.Q_rate, data.Q);
+  }
+
+  void take_terminal_cost(const Problem& problem) noexcept {
+    Cost& P = w_.terminal;
+    P = Cost{};
+    w_.has_terminal_cost = problem.has_terminal_cost;
+    for (int j = 0; j < 6; ++j) {
+      if (problem.has_terminal_cost) {
+        put_state(P.pose_pose[j], P.rate_pose[j], problem.terminal_cost.col(j));
+        put_state(P.pose_rate[j], P.rate_rate[j], problem.terminal_cost.col(6 + j));
+      } else {
+        P.pose_pose[j].v[j + j / 3] = problem.stages.back().Q[j];
+        P.rate_rate[j].v[j + j / 3] = problem.stages.back().Q[6 + j];
+      }
+    }
+  }
+
+  /// The set to begin with: of each stage what was active at its middle in the last solution, whose stages began one
+  /// stage earlier.
+  void guess() noexcept {
+    w_.num_guesses = 0;
+    if (!any_remembered_) return;
+    std::size_t then = 0;
+    for (std::size_t k = 0; k < num_stages(); ++k) {
+      const double middle = remembered_shift_ + start_[k] + 0.5 * duration_[k];
+      while (then + 1 < num_stages() && remembered_end_[then] <= middle) ++then;
+      for (int slot = 0; slot < stages_[k].slots; ++slot) {
+        const int contact = contact_of_slot_[k][static_cast<std::size_t>(slot)];
+        if (contact < 0) continue;
+        const unsigned faces = remembered_[then][static_cast<std::size_t>(contact)];
+        for (int face = 0; face < kFaces; ++face) {
+          if ((faces >> face & 1U) != 0U) guesses_[w_.num_guesses++] = kFaces * (stages_[k].first_row + slot) + face;
+        }
+      }
+    }
+  }
+
+  void remember() noexcept {
+    if (any_remembered_) reset();
+    for (int a = 0; a < w_.active; ++a) {
+      const int row = w_.constraint[a] / kFaces;
+      const auto k = static_cast<std::size_t>(w_.row_stage[row]);
+      const int contact = contact_of_slot_[k][static_cast<std::size_t>(row - stages_[k].first_row)];
+      if (contact < 0) continue;
+      unsigned& faces = remembered_[k][static_cast<std::size_t>(contact)];
+      faces |= 1U << (w_.constraint[a] % kFaces);
+      any_remembered_ = true;
+    }
+    if (!any_remembered_) return;
+    remembered_shift_ = duration_.front();
+    for (std::size_t k = 0; k < num_stages(); ++k) remembered_end_[k] = start_[k] + duration_[k];
+  }
+
+  Sizes sizes_;
+  const Path<NC>& path_;
+  std::size_t max_rows_;
+  std::size_t max_columns_;
+  std::size_t max_active_;
+  std::vector<Stage<NC>> stages_;
+  std::vector<Gain<NC>> gains_;
+  std::vector<Lanes> states_, feedforward_, eight_forces_, eight_feedforward_;
+  Numbers row_numbers_, force_numbers_, columns_, set_numbers_, L_inverse_;
+  std::vector<const double*> columns_of_set_;
+  std::vector<int> row_stage_, constraint_column_, column_constraint_, set_constraint_, candidates_, guesses_;
+  std::vector<std::int8_t> is_active_, active_in_row_;
+  std::vector<std::array<int, NC>> contact_of_slot_;            ///< -1 where none fills it
+  std::vector<double> start_, duration_;                        ///< s, of the stages
+  std::vector<std::array<unsigned, kMaxContacts>> remembered_;  ///< bits: faces active in the last solution
+  std::vector<double> remembered_end_;                          ///< s, of its stages
+  double remembered_shift_ = 0.0;                               ///< s, from its first stage to now
+  bool any_remembered_ = false;
+  Workspace<NC> w_{};
+};
+
+constexpr double kExact = 1e-6;  // N, residuals of a solution that is exact but for rounding
+constexpr int kMaxRefinements = 2;
+constexpr double kActive = 1e-5;  // of a constraint that counts as active, relative to the typical force
+
+class Engine final : public ForceQp {
+ public:
+  Engine(const Settings& settings, Sizes sizes, double typical_force, Simd simd)
+      : sizes_(sizes),
+        typical_force_(typical_force),
+        solver_(make_structured_solver(sizes, typical_force, settings.max_iterations, simd)),
+        kkt_(sizes),
+        taken_over_(sizes) {}
+
+  QpStatus solve(const Problem& problem, Solution& solution) noexcept override {
+    solution.engine = QpEngine::kStructured;
+    solution.iterations = 0;
+    solution.primal_residual = 0.0;
+    solution.dual_residual = 0.0;
+    solution.active = 0;
+    solution.status = inspect(problem, sizes_);
+    if (solution.status == QpStatus::kSolved) solution.status = solve_inspected(problem, solution);
+    if (solution.status == QpStatus::kSolved) {
+      solution.active = count_active(problem, 0, solution.forces.front(), kActive * typical_force_);
+    } else {
+      reset();
+    }
+    return solution.status;
+  }
+
+  void reset() noexcept override {
+    solver_->reset();
+    is_factored_ = false;
+  }
+
+ private:
+  QpStatus solve_inspected(const Problem& problem, Solution& solution) noexcept {
+    if (!is_factored_ || matrices_differ(problem, taken_over_)) {
+      taken_over_ = problem;
+      is_factored_ = solver_->take_matrices(problem);
+      if (!is_factored_) return QpStatus::kInvalidProblem;
+    } else {
+      solver_->take_ahead();
+    }
+    solver_->take_vectors(problem);
+    const QpStatus status = solver_->solve();
+    solution.iterations = solver_->iterations();
+    for (int refinement = 0;; ++refinement) {
+      solver_->forces(solution.forces);
+      const Residuals residuals = kkt_.evaluate(problem, solution.forces, solution.states);
+      solution.primal_residual = residuals.primal;
+      solution.dual_residual = residuals.dual;
+      if (!std::isfinite(residuals.dual)) return QpStatus::kInvalidProblem;  // numbers too large to compute with
+      if (status != QpStatus::kSolved) return status;
+      if (residuals.primal <= kExact && residuals.dual <= kExact) return QpStatus::kSolved;
+      if (refinement == kMaxRefinements) return QpStatus::kInaccurate;
+      solver_->refine();
+    }
+  }
+
+  Sizes sizes_;
+  double typical_force_;  ///< N
+  std::unique_ptr<StructuredSolver> solver_;
+  KktCheck kkt_;
+  Problem taken_over_;
+  bool is_factored_ = false;  ///< with taken_over_'s matrices
+};
+
+}  // namespace
+}  // namespace structured
+
+const std::vector<Simd>& available_simd() {
+  static const std::vector<Simd> available = [] {
+    std::vector<Simd> found = {Simd::kPortable};
+#ifdef STANCE_X86
+    __builtin_cpu_init();
+    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) found.push_back(Simd::kAvx2);
+    if (__builtin_cpu_supports("avx512f")) found.push_back(Simd::kAvx512);
+#endif
+    return found;
+  }();
+  return available;
+}
+
+const char* name(Simd simd) noexcept {
+  switch (simd) {
+    case Simd::kAvx512:
+      return "AVX-512";
+    case Simd::kAvx2:
+      return "AVX2";
+    default:
+      return "portable";
+  }
+}
+
+std::unique_ptr<StructuredSolver> make_structured_solver(Sizes sizes, double typical_force, int max_iterations,
+                                                         Simd simd) {
+  switch (sizes.num_contacts) {
+    case 1:
+      return std::make_unique<structured::Solver<1>>(sizes, typical_force, max_iterations, simd);
+    case 2:
+      return std::make_unique<structured::Solver<2>>(sizes, typical_force, max_iterations, simd);
+    default:
+      return std::make_unique<structured::Solver<4>>(sizes, typical_force, max_iterations, simd);
+  }
+}
+
+std::unique_ptr<ForceQp> make_structured_engine(const Settings& settings, Sizes sizes, double typical_force,
+                                                Simd simd) {
+  return std::make_unique<structured::Engine>(settings, sizes, typical_force, simd);
+}
+
+}  // namespace stance::force_qp

@@ -1,0 +1,233 @@
+// The structured engine where it differs from the others: any model of the structure, any schedule, every path.
+#include "controller/force_qp/structured/structured.hpp"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <catch2/catch_test_macros.hpp>
+#include <random>
+
+#include "controller/force_qp/kkt.hpp"
+#include "tests/force_qp/problems.hpp"
+#include "tests/force_qp/reference_solver.hpp"
+
+using namespace stance;
+using namespace stance::force_qp;
+using namespace stance::force_qp::test;
+
+namespace {
+
+constexpr double kForceTolerance = 1e-6;   // N, in every stage
+constexpr double kUpdateTolerance = 1e-8;  // N, between an engine with a history and a fresh one
+
+double force_error(const std::vector<ForceVector>& a, const std::vector<ForceVector>& b) {
+  double worst = 0.0;
+  for (std::size_t k = 0; k < a.size(); ++k) worst = std::max(worst, (a[k] - b[k]).cwiseAbs().maxCoeff());
+  return worst;
+}
+
+std::unique_ptr<ForceQp> make(Sizes sizes, Simd simd = available_simd().back()) {
+  Settings settings;
+  settings.engine = QpEngine::kStructured;
+  return make_structured_engine(settings, sizes, kWeight, simd);
+}
+
+/// Any problem of the structure: every matrix, weight, bound and contact differs from stage to stage.
+Problem any_problem(Sizes sizes, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  const auto matrix = [&](auto block, double scale) {
+    for (Eigen::Index i = 0; i < block.size(); ++i) block(i) = scale * normal(random);
+  };
+  Problem problem(sizes);
+  problem.friction = 0.05 + 1.45 * uniform(random);
+  matrix(problem.x0.head(12), 0.2);
+  for (StageData& stage : problem.stages) {
+    const double dt = uniform(random) < 0.5 ? 0.01 : 0.03;
+    Dynamics& dynamics = stage.dynamics;
+    dynamics.A.setIdentity();
+    Matrix3 block;
+    const auto any = [&](double scale) -> const Matrix3& {
+      matrix(block.reshaped(), scale);
+      return block;
+    };
+    dynamics.A.block<3, 3>(0, 6) = dt * (Matrix3::Identity() + any(0.3));
+    dynamics.A.block<3, 3>(3, 9) = dt * (Matrix3::Identity() + any(0.3));
+    if (uniform(random) < 0.7) dynamics.A.block<3, 3>(6, 3) = dt * any(100.0);
+    for (int c = 0; c < sizes.num_contacts; ++c) {
+      const auto contact = static_cast<std::size_t>(c);
+      dynamics.B.block<3, 3>(6, 3 * c) = dt * any(0.5);
+      dynamics.B.block<3, 3>(9, 3 * c) = dt / kMass * (Matrix3::Identity() + any(0.1));
+      const bool stands = uniform(random) < 0.7 || (c == 0 && &stage == &problem.stages.front());
+      stage.fz_max[contact] = stands ? 20.0 + 200.0 * uniform(random) : 0.0;
+      stage.fz_min[contact] = stands && uniform(random) < 0.5 ? 0.9 * uniform(random) * stage.fz_max[contact] : 0.0;
+    }
+    matrix(dynamics.g.head(12), 0.01);
+    dynamics.g(11) -= dt * kGravity;
+    matrix(stage.x_ref.head(12), 0.1);
+    matrix(stage.f_ref.head(3 * sizes.num_contacts), 30.0);
+    for (int i = 0; i < 12; ++i) stage.Q(i) = uniform(random) < 0.2 ? 0.0 : std::pow(10.0, 3.0 * uniform(random));
+    for (int i = 0; i < 3 * sizes.num_contacts; ++i) stage.R(i) = std::pow(10.0, -3.0 * uniform(random));
+  }
+  if (uniform(random) < 0.5) {
+    StateMatrix root;
+    matrix(root.reshaped(), 10.0);
+    problem.has_terminal_cost = true;
+    problem.terminal_cost = root * root.transpose();
+  }
+  return problem;
+}
+
+}  // namespace
+
+TEST_CASE("AnyProblemOfTheStructureIsSolvedAsByTheReferenceSolver") {
+  for (const int num_contacts : {1, 2, 3, 4}) {
+    for (const int num_stages : {1, 4, 9}) {
+      std::mt19937_64 random(21);
+      auto engine = make({num_stages, num_contacts});
+      Solution solution({num_stages, num_contacts});
+      int active = 0;
+      for (int repeat = 0; repeat < 25; ++repeat) {
+        const Problem problem = any_problem({num_stages, num_contacts}, random);
+        INFO(num_contacts << " contacts, " << num_stages << " stages, repeat " << repeat);
+        REQUIRE(engine->solve(problem, solution) == QpStatus::kSolved);
+        CHECK(force_error(solution.forces, reference_forces(problem)) <= kForceTolerance);
+        active += solution.iterations > 0;
+      }
+      CHECK(active > 0);
+    }
+  }
+}
+
+TEST_CASE("InFlightTheForcesAreZero") {
+  Problem problem = standing(5);
+  for (StageData& stage : problem.stages) {
+    stage.fz_min.fill(0.0);
+    stage.fz_max.fill(0.0);
+  }
+  Solution solution(problem.sizes);
+  REQUIRE(make(problem.sizes)->solve(problem, solution) == QpStatus::kSolved);
+  for (const ForceVector& f : solution.forces) CHECK(f.isZero(0.0));
+}
+
+TEST_CASE("EveryPathGivesTheSameBits") {
+  REQUIRE(!available_simd().empty());
+  for (const int num_contacts : {1, 2, 3, 4}) {
+    std::mt19937_64 random(22);
+    std::vector<std::unique_ptr<ForceQp>> engines;
+    for (const Simd simd : available_simd()) engines.push_back(make({12, num_contacts}, simd));
+    Solution first({12, num_contacts});
+    Solution other({12, num_contacts});
+    Problem problem = any_problem({12, num_contacts}, random);
+    for (int repeat = 0; repeat < 40; ++repeat) {
+      if (repeat % 4 == 0) problem = any_problem({12, num_contacts}, random);
+      disturb(problem, 5.0, random);
+      const QpStatus status = engines.front()->solve(problem, first);
+      CHECK(status == QpStatus::kSolved);
+      for (std::size_t i = 1; i < engines.size(); ++i) {
+        INFO(name(available_simd()[i]) << ", repeat " << repeat);
+        CHECK(engines[i]->solve(problem, other) == status);
+        CHECK(other.iterations == first.iterations);
+        CHECK(other.forces == first.forces);
+      }
+    }
+  }
+}
+
+TEST_CASE("ColumnsThatAreKeptGiveWhatNewOnesGive") {
+  for (const int num_contacts : {2, 4}) {
+    std::mt19937_64 random(23);
+    const Problem base = standing(10, num_contacts, 0.2);
+    auto with_history = make(base.sizes);
+    Solution kept(base.sizes);
+    Solution fresh(base.sizes);
+    for (int tick = 0; tick < 60; ++tick) {
+      Problem problem = base;
+      disturb(problem, 6.0, random);
+      REQUIRE(with_history->solve(problem, kept) == QpStatus::kSolved);
+      REQUIRE(make(base.sizes)->solve(problem, fresh) == QpStatus::kSolved);
+      CHECK(force_error(kept.forces, fresh.forces) <= kUpdateTolerance);
+    }
+  }
+}
+
+TEST_CASE("ARepeatedProblemNeedsNoSecondSearch") {
+  std::mt19937_64 random(24);
+  Problem problem = standing(10, 2, 0.2);
+  disturb(problem, 6.0, random);
+  // All stages active alike, so that the set moved by a stage is the set.
+  auto engine = make(problem.sizes);
+  Solution first(problem.sizes);
+  REQUIRE(engine->solve(problem, first) == QpStatus::kSolved);
+  REQUIRE(first.iterations > 1);
+  Solution second(problem.sizes);
+  REQUIRE(engine->solve(problem, second) == QpStatus::kSolved);
+  CHECK(second.iterations < first.iterations);
+  CHECK(force_error(first.forces, second.forces) <= kUpdateTolerance);
+}
+
+TEST_CASE("ManyActiveConstraintsOverALongHorizonAreSolvedExactly") {
+  for (const double friction : {0.1, 0.2, 0.4}) {
+    std::mt19937_64 random(25);
+    auto engine = make({50, 2});
+    Solution solution({50, 2});
+    int most = 0;
+    for (int tick = 0; tick < 30; ++tick) {
+      Problem problem = walking(50, tick, friction);
+      disturb(problem, 12.0, random);
+      REQUIRE(engine->solve(problem, solution) == QpStatus::kSolved);
+      int active = 0;
+      for (int k = 0; k < 50; ++k)
+        active += count_active(problem, k, solution.forces[static_cast<std::size_t>(k)], 1e-6);
+      most = std::max(most, active);
+    }
+    CHECK(most > 40);
+  }
+}
+
+TEST_CASE("FarFromTheOriginNothingIsLost") {
+  std::mt19937_64 random(26);
+  for (int repeat = 0; repeat < 20; ++repeat) {
+    Problem near = walking(20, 5 * repeat, 0.3);
+    disturb(near, 4.0, random);
+    Problem far = near;
+    const Vector3 shift(2000.0, -3000.0, 500.0);  // m
+    far.x0.segment<3>(3) += shift;
+    for (StageData& stage : far.stages) {
+      stage.x_ref.segment<3>(3) += shift;
+      stage.dynamics.g.segment<3>(6) -= stage.dynamics.A.block<3, 3>(6, 3) * shift;
+    }
+    Solution here(near.sizes);
+    Solution there(near.sizes);
+    REQUIRE(make(near.sizes)->solve(near, here) == QpStatus::kSolved);
+    REQUIRE(make(far.sizes)->solve(far, there) == QpStatus::kSolved);
+    CHECK(force_error(here.forces, there.forces) <= 1e-5);  // what rounding x itself to 1e-13 m costs
+  }
+}
+
+TEST_CASE("RefinementMendsWhatRoundingSpoils") {
+  std::mt19937_64 random(27);
+  double before = 0.0;
+  double after = 0.0;
+  for (int repeat = 0; repeat < 10; ++repeat) {
+    Problem problem = standing(20);
+    disturb(problem, 3.0e4, random);  // forces that the bounds are far from
+    for (StageData& stage : problem.stages) {
+      stage.fz_min.fill(0.0);
+      stage.fz_max = {1e9, 1e9, 0.0, 0.0};
+      stage.R.setConstant(1e-6);
+    }
+    auto solver = make_structured_solver(problem.sizes, kWeight, 1000);
+    Solution solution(problem.sizes);
+    KktCheck kkt(problem.sizes);
+    REQUIRE(solver->take_matrices(problem));
+    solver->take_vectors(problem);
+    if (solver->solve() != QpStatus::kSolved) continue;
+    solver->forces(solution.forces);
+    before = std::max(before, kkt.evaluate(problem, solution.forces, solution.states).dual);
+    solver->refine();
+    solver->forces(solution.forces);
+    after = std::max(after, kkt.evaluate(problem, solution.forces, solution.states).dual);
+  }
+  CHECK(before > 0.0);
+  CHECK(after < 0.5 * before);
+}
