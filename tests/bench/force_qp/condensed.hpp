@@ -1,0 +1,44 @@
+#pragma once
+// The force QP without its states, as dense solvers take it:   min 1/2 u'H u + q'u   s.t.   C u <= 0,  lower <= u_z <=
+// upper
+//
+// u: forces of the contacts in stance, in units of the typical force. C: four friction faces of each contact.
+#include <Eigen/Core>
+#include <vector>
+
+#include "controller/force_qp/force_qp.hpp"
+
+namespace stance::bench {
+
+class Condensed {
+ public:
+  Condensed(const force_qp::Problem& problem, double typical_force);
+
+  /// H (with the constraints' sizes as they were) and q, or q alone.
+  void update(const force_qp::Problem& problem, bool matrices_changed);
+  void forces(const force_qp::Problem& problem, const double* u, std::vector<force_qp::ForceVector>& out) const;
+
+  int num_variables() const { return static_cast<int>(3 * contacts_.size()); }
+  int num_contacts() const { return static_cast<int>(contacts_.size()); }
+
+  Eigen::MatrixXd H;  ///< both triangles
+  Eigen::VectorXd q;
+  Eigen::VectorXd lower, upper;  ///< of each contact's u_z
+
+ private:
+  struct Contact {
+    int stage;
+    int contact;
+  };
+  void list_contacts(const force_qp::Problem& problem);
+  void hessian(const force_qp::Problem& problem);
+  void gradient(const force_qp::Problem& problem);
+
+  double typical_force_;  ///< N
+  std::vector<Contact> contacts_;
+  using Column = Eigen::Matrix<double, 12, 3>;
+  std::vector<Column> response_;  ///< of x_(k+1) to a contact's forces
+  std::vector<force_qp::StateVector> error_;
+};
+
+}  // namespace stance::bench

@@ -1,0 +1,22 @@
+#include "tests/bench/force_qp/peers.hpp"
+
+namespace stance::bench {
+
+std::vector<EngineKind> peers() {
+  return {
+#ifdef STANCE_BENCH_DAQP
+      daqp(),
+#endif
+#ifdef STANCE_BENCH_CMEEL
+      eiquadprog(), qpoases(), proxqp(),
+#endif
+#ifdef STANCE_BENCH_PIQP
+      piqp(),
+#endif
+#ifdef STANCE_BENCH_HPIPM
+      hpipm(),
+#endif
+  };
+}
+
+}  // namespace stance::bench
