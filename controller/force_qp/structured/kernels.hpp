@@ -650,37 +650,31 @@ class ActiveSet {
     double* pull = w.free_forces;
     for (int i = 0; i < 3 * w.padded_rows; ++i) pull[i] = 0.0;
     for (int a = 0; a < w.active; ++a) {
-      double n[3];
-      normal(w.constraint[a], w.friction, n);
-      for (int d = 0; d < 3; ++d) pull[d * w.padded_rows + w.constraint[a] / kFaces] += w.multiplier[a] * n[d];
+      const Constraint& c = w.constraint[a];
+      pull[c.side_at] += c.side * w.multiplier[a];
+      pull[c.up_at] += c.up * w.multiplier[a];
     }
     sweep<NC>(w, w.forces, pull, w.forces);
     correct_rounding();
   }
 
  private:
-  // c_i v, and b_i
-  double along(int i, const double* v) const noexcept {
-    const int row = i / kFaces;
-    const double z = v[2 * w.padded_rows + row];
-    switch (i % kFaces) {
-      case 0:
-        return v[row] - w.friction * z;
-      case 1:
-        return -v[row] - w.friction * z;
-      case 2:
-        return v[w.padded_rows + row] - w.friction * z;
-      case 3:
-        return -v[w.padded_rows + row] - w.friction * z;
-      case 4:
-        return z;
-      default:
-        return -z;
-    }
+  Constraint constraint_of(int id) const noexcept {
+    static constexpr double kSide[kFaces] = {1.0, -1.0, 1.0, -1.0, 0.0, 0.0};
+    const int row = id / kFaces;
+    const int face = id % kFaces;
+    Constraint c;
+    c.id = id;
+    c.side = kSide[face];
+    c.side_at = (face == 2 || face == 3 ? w.padded_rows : 0) + row;
+    c.up = face < 4 ? -w.friction : face == 4 ? 1.0 : -1.0;
+    c.up_at = 2 * w.padded_rows + row;
+    c.bound = face < 4 ? 0.0 : face == 4 ? w.fz_max[row] : -w.fz_min[row];
+    return c;
   }
-  double bound(int i) const noexcept {
-    const int face = i % kFaces;
-    return face < 4 ? 0.0 : face == 4 ? w.fz_max[i / kFaces] : -w.fz_min[i / kFaces];
+  /// c v
+  static double along(const Constraint& c, const double* v) noexcept {
+    return c.side * v[c.side_at] + c.up * v[c.up_at];
   }
   const double* column_of(int i) const noexcept {
     return w.columns + static_cast<std::int64_t>(w.column_of[i]) * 3 * w.padded_rows;
@@ -692,8 +686,8 @@ class ActiveSet {
     for (int a = 0; a < w.active; ++a) {
       double* row = row_of_L_inverse(a);
       for (int b = 0; b <= a / 8; ++b) store(row + 8 * b, zeros());
-      w.is_active[w.constraint[a]] = 0;
-      w.active_in_row[w.constraint[a] / kFaces] = 0;
+      w.is_active[w.constraint[a].id] = 0;
+      w.active_in_row[w.constraint[a].id / kFaces] = 0;
     }
     w.active = 0;
   }
@@ -727,25 +721,25 @@ class ActiveSet {
     return sum(squares);
   }
 
-  /// direction = M^-1 C_A v; returns the curvature c_i v that the active set leaves to constraint i, v = H^-1 c_i.
-  double curvature_left(int i, const double* v) noexcept {
+  /// direction = M^-1 C_A v; returns the curvature c v that the active set leaves to constraint c, v = H^-1 c.
+  double curvature_left(const Constraint& c, const double* v) noexcept {
     for (int a = 0; a < w.active; ++a) w.right[a] = along(w.constraint[a], v);
-    return along(i, v) - solve_small();
+    return along(c, v) - solve_small();
   }
 
-  /// Appends constraint i; `left` and direction as curvature_left gave them.
-  void append(int i, const double* v, double left) noexcept {
+  /// Appends constraint c; `left` and direction as curvature_left gave them.
+  void append(const Constraint& c, const double* v, double left) noexcept {
     const int k = w.active;
     double* row = row_of_L_inverse(k);
     const double scale = 1.0 / __builtin_sqrt(left);
     for (int a = 0; a < k; ++a) row[a] = -w.direction[a] * scale;
     row[k] = scale;
     for (int a = k + 1; a < 8 * (k / 8 + 1); ++a) row[a] = 0.0;
-    w.constraint[k] = i;
+    w.constraint[k] = c;
     w.column[k] = v;
-    w.excess[k] = along(i, w.free_forces) - bound(i);
-    w.is_active[i] = 1;
-    ++w.active_in_row[i / kFaces];
+    w.excess[k] = along(c, w.free_forces) - c.bound;
+    w.is_active[c.id] = 1;
+    ++w.active_in_row[c.id / kFaces];
     ++w.active;
   }
 
@@ -753,9 +747,10 @@ class ActiveSet {
   bool try_append(int i) noexcept {
     if (w.active == w.max_active) return false;
     const double* v = column_of(i);
-    const double left = curvature_left(i, v);
-    if (!(left > kDependent * along(i, v))) return false;
-    append(i, v, left);
+    const Constraint c = constraint_of(i);
+    const double left = curvature_left(c, v);
+    if (!(left > kDependent * along(c, v))) return false;
+    append(c, v, left);
     return true;
   }
 
@@ -763,8 +758,8 @@ class ActiveSet {
   /// goes with it.
   void drop(int j) noexcept {
     const int k = w.active;
-    w.is_active[w.constraint[j]] = 0;
-    --w.active_in_row[w.constraint[j] / kFaces];
+    w.is_active[w.constraint[j].id] = 0;
+    --w.active_in_row[w.constraint[j].id / kFaces];
     // half: column j from row j on; right: the norms of its first entries
     double squares = 0.0;
     for (int i = j; i < k; ++i) {
@@ -957,10 +952,11 @@ class ActiveSet {
   Outcome step(int i, double violation) noexcept {
     if (!fetch(i)) return Outcome::kOutOfBudget;
     const double* v = column_of(i);
-    const double curvature = along(i, v);
+    const Constraint c = constraint_of(i);
+    const double curvature = along(c, v);
     double multiplier = 0.0;
     for (;;) {
-      const double left = curvature_left(i, v);
+      const double left = curvature_left(c, v);
       const bool independent = left > kDependent * curvature;
       int blocking = -1;
       double blocking_step = 0.0;
@@ -976,7 +972,7 @@ class ActiveSet {
       if (independent && (blocking < 0 || full_step <= blocking_step)) {
         if (w.active == w.max_active) return Outcome::kOutOfBudget;
         for (int a = 0; a < w.active; ++a) w.multiplier[a] -= full_step * w.direction[a];
-        append(i, v, left);
+        append(c, v, left);
         w.multiplier[w.active - 1] = multiplier + full_step;
         return Outcome::kSolved;
       }
@@ -994,7 +990,7 @@ class ActiveSet {
   void correct_rounding() noexcept {
     double worst = 0.0;
     for (int a = 0; a < w.active; ++a) {
-      w.right[a] = along(w.constraint[a], w.forces) - bound(w.constraint[a]);
+      w.right[a] = along(w.constraint[a], w.forces) - w.constraint[a].bound;
       const double size = __builtin_fabs(w.right[a]);
       worst = size > worst ? size : worst;
     }

@@ -76,9 +76,9 @@ class Solver final : public StructuredSolver {
         row_stage_(max_rows_, 0),
         constraint_column_(kFaces * max_rows_, -1),
         column_constraint_(max_columns_, 0),
-        set_constraint_(max_active_ + 1, 0),
         candidates_(kFaces * max_rows_, 0),
         guesses_(kFaces * max_rows_, 0),
+        set_constraint_(max_active_ + 1),
         is_active_(kFaces * max_rows_, 0),
         active_in_row_(max_rows_, 0),
         contact_of_slot_(num_stages()),
@@ -272,12 +272,12 @@ class Solver final : public StructuredSolver {
   void remember() noexcept {
     if (any_remembered_) reset();
     for (int a = 0; a < w_.active; ++a) {
-      const int row = w_.constraint[a] / kFaces;
+      const int row = w_.constraint[a].id / kFaces;
       const auto k = static_cast<std::size_t>(w_.row_stage[row]);
       const int contact = contact_of_slot_[k][static_cast<std::size_t>(row - stages_[k].first_row)];
       if (contact < 0) continue;
       unsigned& faces = remembered_[k][static_cast<std::size_t>(contact)];
-      faces |= 1U << (w_.constraint[a] % kFaces);
+      faces |= 1U << (w_.constraint[a].id % kFaces);
       any_remembered_ = true;
     }
     if (!any_remembered_) return;
@@ -295,7 +295,8 @@ class Solver final : public StructuredSolver {
   std::vector<Lanes> states_, feedforward_, eight_forces_, eight_feedforward_;
   Numbers row_numbers_, force_numbers_, columns_, set_numbers_, L_inverse_;
   std::vector<const double*> columns_of_set_;
-  std::vector<int> row_stage_, constraint_column_, column_constraint_, set_constraint_, candidates_, guesses_;
+  std::vector<int> row_stage_, constraint_column_, column_constraint_, candidates_, guesses_;
+  std::vector<Constraint> set_constraint_;
   std::vector<std::int8_t> is_active_, active_in_row_;
   std::vector<std::array<int, NC>> contact_of_slot_;            ///< -1 where none fills it
   std::vector<double> start_, duration_;                        ///< s, of the stages

@@ -49,6 +49,14 @@ struct Cost {
   Lanes pose_pose[6], pose_rate[6], rate_pose[6], rate_rate[6];
 };
 
+/// A constraint c_i f <= b_i of one contact: c_i f = side f[side_at] + up f[up_at].
+struct Constraint {
+  double side, up;
+  double bound;
+  int side_at, up_at;
+  int id;  ///< kFaces row + face
+};
+
 enum class Outcome : std::int8_t { kSolved, kOutOfBudget, kSingular };
 
 /// All memory of an engine. Arrays over contacts ("rows") have one entry for each slot of each stage, padded to a
@@ -85,7 +93,7 @@ struct Workspace {
   // The active set
   int max_active, stride;  ///< of L_inverse's rows
   int active;
-  int* constraint;  ///< max_active + 1
+  Constraint* constraint;  ///< max_active
   double* multiplier;
   double* excess;  ///< c_i u0 - b_i
   const double** column;
