@@ -43,6 +43,8 @@ Solution::Solution(Sizes sizes)
 void Settings::validate() const {
   require(tolerance >= 1e-12 && tolerance <= 1e-2, "tolerance", tolerance, "[1e-12, 1e-2]");
   require(max_iterations >= 1 && max_iterations <= 1000000, "max_iterations", max_iterations, "[1, 1000000]");
+  require(fallback_iterations >= 0 && fallback_iterations <= 1000000, "fallback_iterations", fallback_iterations,
+          "[0, 1000000]");
   require(check_interval >= 1 && check_interval <= 1000, "check_interval", check_interval, "[1, 1000]");
   require(rho >= 1e-6 && rho <= 1e6, "rho", rho, "[1e-6, 1e6]");
   require(max_primal_residual > 0.0 && std::isfinite(max_primal_residual), "max_primal_residual", max_primal_residual,

@@ -6,7 +6,8 @@
 //        |fx|, |fy| <= mu fz,   fz_min <= fz <= fz_max         for each contact and stage; fz_max = 0 in swing
 //
 // A and B have the structure of centroidal.hpp. Sizes and sparsity are frozen at set-up: a contact change alters bounds
-// and values, never dimensions. What the engines do is told in osqp_engine.hpp.
+// and values, never dimensions. What the engines do is told in osqp_engine.hpp and
+// structured/structured.hpp.
 #include <memory>
 #include <vector>
 
@@ -49,7 +50,7 @@ struct Solution {
   explicit Solution(Sizes sizes);
   QpStatus status = QpStatus::kNotRun;
   QpEngine engine = QpEngine::kOsqpCondensed;
-  int iterations = 0;               ///< of OSQP; 0 where the free minimiser is the solution
+  int iterations = 0;               ///< of the engine; 0 where what it began with is the solution
   double primal_residual = 0.0;     ///< N, largest violation of a force constraint
   double dual_residual = 0.0;       ///< N, largest step of a projected gradient (see kkt.hpp)
   int active = 0;                   ///< constraints active in stage 0
@@ -60,7 +61,8 @@ struct Solution {
 struct Settings {
   QpEngine engine = QpEngine::kOsqpCondensed;
   double tolerance = 1e-6;           ///< OSQP's eps_abs and eps_rel, on the scaled problem
-  int max_iterations = 1000;         ///< of OSQP in one solve: a deterministic bound
+  int max_iterations = 1000;         ///< in one solve: a deterministic bound
+  int fallback_iterations = 200;     ///< of OSQP after `structured` has failed, in the same tick; 0: OSQP is not asked
   int check_interval = 10;           ///< iterations between OSQP's termination checks
   double rho = 1.0;                  ///< OSQP's, to start with
   double max_primal_residual = 0.5;  ///< N, above it a solution is kInaccurate

@@ -388,6 +388,7 @@ TEST_CASE("BadSettingsAndSizesAreRefusedAtSetUp") {
   CHECK(refused([](Settings& s) { s.tolerance = 0.0; }));
   CHECK(refused([](Settings& s) { s.tolerance = std::numeric_limits<double>::quiet_NaN(); }));
   CHECK(refused([](Settings& s) { s.max_iterations = 0; }));
+  CHECK(refused([](Settings& s) { s.fallback_iterations = -1; }));
   CHECK(refused([](Settings& s) { s.check_interval = 0; }));
   CHECK(refused([](Settings& s) { s.rho = -1.0; }));
   CHECK(refused([](Settings& s) { s.max_primal_residual = 0.0; }));

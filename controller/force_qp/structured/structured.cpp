@@ -5,6 +5,7 @@
 
 #include "controller/force_qp/inspect.hpp"
 #include "controller/force_qp/kkt.hpp"
+#include "controller/force_qp/osqp_engine.hpp"
 #include "controller/force_qp/structured/paths.hpp"
 
 namespace stance::force_qp {
@@ -309,14 +310,23 @@ class Solver final : public StructuredSolver {
 
 constexpr double kExact = 1e-6;  // N, residuals of a solution that is exact but for rounding
 constexpr int kMaxRefinements = 2;
-constexpr double kActive = 1e-5;  // of a constraint that counts as active, relative to the typical force
+constexpr double kActive = 1e-5;         // of a constraint that counts as active, relative to the typical force
+constexpr int kMaxCondensedStages = 20;  // up to which OSQP is faster without the states
+
+std::unique_ptr<ForceQp> make_fallback(Settings settings, Sizes sizes, double typical_force) {
+  if (settings.fallback_iterations == 0) return nullptr;
+  settings.engine = sizes.num_stages <= kMaxCondensedStages ? QpEngine::kOsqpCondensed : QpEngine::kOsqpSparse;
+  settings.max_iterations = std::min(settings.max_iterations, settings.fallback_iterations);
+  return make_osqp_engine(settings, sizes, typical_force);
+}
 
 class Engine final : public ForceQp {
  public:
-  Engine(const Settings& settings, Sizes sizes, double typical_force, Simd simd)
+  Engine(const Settings& settings, Sizes sizes, double typical_force, std::unique_ptr<StructuredSolver> solver)
       : sizes_(sizes),
         typical_force_(typical_force),
-        solver_(make_structured_solver(sizes, typical_force, settings.max_iterations, simd)),
+        solver_(std::move(solver)),
+        fallback_(make_fallback(settings, sizes, typical_force)),
         kkt_(sizes),
         taken_over_(sizes) {}
 
@@ -327,18 +337,23 @@ class Engine final : public ForceQp {
     solution.dual_residual = 0.0;
     solution.active = 0;
     solution.status = inspect(problem, sizes_);
-    if (solution.status == QpStatus::kSolved) solution.status = solve_inspected(problem, solution);
+    if (solution.status != QpStatus::kSolved) {
+      reset();
+      return solution.status;
+    }
+    solution.status = solve_inspected(problem, solution);
     if (solution.status == QpStatus::kSolved) {
       solution.active = count_active(problem, 0, solution.forces.front(), kActive * typical_force_);
-    } else {
-      reset();
+      return solution.status;
     }
-    return solution.status;
+    reset();
+    return fallback_ == nullptr ? solution.status : fallback_->solve(problem, solution);
   }
 
   void reset() noexcept override {
     solver_->reset();
     is_factored_ = false;
+    if (fallback_ != nullptr) fallback_->reset();
   }
 
  private:
@@ -369,6 +384,7 @@ class Engine final : public ForceQp {
   Sizes sizes_;
   double typical_force_;  ///< N
   std::unique_ptr<StructuredSolver> solver_;
+  std::unique_ptr<ForceQp> fallback_;  ///< may be none
   KktCheck kkt_;
   Problem taken_over_;
   bool is_factored_ = false;  ///< with taken_over_'s matrices
@@ -415,7 +431,13 @@ std::unique_ptr<StructuredSolver> make_structured_solver(Sizes sizes, double typ
 
 std::unique_ptr<ForceQp> make_structured_engine(const Settings& settings, Sizes sizes, double typical_force,
                                                 Simd simd) {
-  return std::make_unique<structured::Engine>(settings, sizes, typical_force, simd);
+  return make_structured_engine(settings, sizes, typical_force,
+                                make_structured_solver(sizes, typical_force, settings.max_iterations, simd));
+}
+
+std::unique_ptr<ForceQp> make_structured_engine(const Settings& settings, Sizes sizes, double typical_force,
+                                                std::unique_ptr<StructuredSolver> solver) {
+  return std::make_unique<structured::Engine>(settings, sizes, typical_force, std::move(solver));
 }
 
 }  // namespace stance::force_qp
