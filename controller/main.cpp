@@ -54,7 +54,7 @@ int main(int argc, char** argv) {
   auto* lockstep_flag = app.add_flag("--lockstep", lockstep, "Answer each state once, as fast as they come");
   app.add_flag("--realtime", real_time, "Tick on absolute deadlines (default)")->excludes(lockstep_flag);
   app.add_option("--solver", engine,
-                 "Engine of the force QP in place of the robot's own: osqp-condensed or osqp-sparse");
+                 "Engine of the force QP in place of the robot's own: structured, osqp-condensed or osqp-sparse");
   app.add_option("--lcm-url", url, "LCM's network")->capture_default_str();
   app.add_option("--priority", priority, "SCHED_FIFO priority")->check(CLI::Range(1, 99))->capture_default_str();
   app.add_option("--cpu", cpu, "Core to pin to");

@@ -49,8 +49,10 @@ void force_qp(StrictYaml yaml, force_qp::Settings& settings, behaviours::ForceLi
     settings.engine = QpEngine::kOsqpCondensed;
   } else if (engine == "osqp-sparse") {
     settings.engine = QpEngine::kOsqpSparse;
+  } else if (engine == "structured") {
+    settings.engine = QpEngine::kStructured;
   } else {
-    yaml.fail("engine", "is '" + engine + "', but must be osqp-condensed or osqp-sparse");
+    yaml.fail("engine", "is '" + engine + "', but must be structured, osqp-condensed or osqp-sparse");
   }
   settings.tolerance = yaml.number("tolerance");
   settings.max_iterations = yaml.integer("max_iterations");

@@ -32,7 +32,7 @@ TEST_CASE("AThousandTicksWithPushesAndFaultsMakeNoHeapCall") {
   const ByteVector command = bytes_of(wish);
   const ByteVector stop = bytes_of(stance_msgs::stop_t{});
 
-  for (const char* engine : {"osqp-condensed", "osqp-sparse"}) {
+  for (const char* engine : {"structured", "osqp-condensed", "osqp-sparse"}) {
     const config::RobotDescription robot = biped_with("controller.force_qp.engine", engine);
     loop::Ticker ticker(compose(robot));
     loop::WallClock clock;

@@ -237,9 +237,9 @@ TEST_CASE("DrivesAndTheLimitsOfAFallAreReadStrictlyToo") {
 }
 
 TEST_CASE("AnUnknownEngineAndAWrongNumberOfWeightsAreRefusedByPath") {
-  CHECK_THROWS_MATCHES(
-      biped_config_of(biped_yaml_with("controller.force_qp.engine", "qpoases")), ConfigError,
-      Message("biped.yaml: controller.force_qp.engine is 'qpoases', but must be osqp-condensed or osqp-sparse"));
+  CHECK_THROWS_MATCHES(biped_config_of(biped_yaml_with("controller.force_qp.engine", "qpoases")), ConfigError,
+                       Message("biped.yaml: controller.force_qp.engine is 'qpoases', but must be structured, "
+                               "osqp-condensed or osqp-sparse"));
   CHECK_THROWS_MATCHES(biped_config_of(biped_yaml_with("controller.stand.state_weights", "[1, 2]")), ConfigError,
                        Message("biped.yaml: controller.stand.state_weights has 2 entries, but must have 12"));
 }
