@@ -51,8 +51,9 @@ check-debug check-asan check-tsan: check-%:
 	ctest --preset $*
 
 bench: peers
+	@setup/bench_peers.sh
 	@$(MAKE) --no-print-directory build
-	@cmake --build --preset release --parallel $(JOBS) --target bench_rigid_body
+	@cmake --build --preset $(PRESET) --parallel $(JOBS) --target bench_force_qp bench_rigid_body
 	build/release/bin/bench_force_qp
 	build/release/bin/bench_rigid_body
 	$(PYTHON) tests/bench/tick.py
@@ -68,12 +69,13 @@ format:
 	.venv/bin/clang-format -i $(CPP)
 	.venv/bin/ruff format analysis tests
 
-# Resolves setup/python.in and setup/peers.in anew; needs `uv` and the network.
+# Resolves setup/*.in anew; needs `uv` and the network.
 RESOLVE = uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
   --no-emit-find-links --no-header --no-annotate
 lock:
 	$(RESOLVE) setup/python.in -o setup/python.lock
 	$(RESOLVE) --constraints setup/python.lock setup/peers.in -o setup/peers.lock
+	$(RESOLVE) --no-deps setup/bench.in -o setup/bench.lock
 
 clean:
 	rm -rf build runs

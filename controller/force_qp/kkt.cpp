@@ -7,6 +7,28 @@
 namespace stance::force_qp {
 namespace {
 
+// With the structure of A = [I 0 D 0; 0 I 0 E; 0 C I 0; 0 0 0 I] and B = [0; Bv] that inspect() asks for.
+
+/// A x + B f + g
+void step(const Dynamics& dynamics, int num_contacts, const StateVector& x, const ForceVector& f,
+          StateVector& next) noexcept {
+  next = x + dynamics.g;
+  next.segment<3>(0).noalias() += dynamics.A.block<3, 3>(0, 6).lazyProduct(x.segment<3>(6));
+  next.segment<3>(3).noalias() += dynamics.A.block<3, 3>(3, 9).lazyProduct(x.segment<3>(9));
+  next.segment<3>(6).noalias() += dynamics.A.block<3, 3>(6, 3).lazyProduct(x.segment<3>(3));
+  for (int c = 0; c < num_contacts; ++c) {
+    next.tail<6>().noalias() += dynamics.B.block<6, 3>(6, 3 * c).lazyProduct(f.segment<3>(3 * c));
+  }
+}
+
+/// to += A' lambda
+void add_A_transposed_times(const StateMatrix& A, const StateVector& lambda, StateVector& to) noexcept {
+  to += lambda;
+  to.segment<3>(3).noalias() += A.block<3, 3>(6, 3).transpose().lazyProduct(lambda.segment<3>(6));
+  to.segment<3>(6).noalias() += A.block<3, 3>(0, 6).transpose().lazyProduct(lambda.segment<3>(0));
+  to.segment<3>(9).noalias() += A.block<3, 3>(3, 9).transpose().lazyProduct(lambda.segment<3>(3));
+}
+
 Residuals contact_residuals(const Vector3& f, const Vector3& gradient, double R_min, double friction, double fz_min,
                             double fz_max) noexcept {
   const double face = friction * f.z();
@@ -60,10 +82,7 @@ Residuals KktCheck::evaluate(const Problem& problem, const std::vector<ForceVect
   const std::size_t N = problem.stages.size();
   const StateVector* x = &problem.x0;
   for (std::size_t k = 0; k < N; ++k) {
-    const Dynamics& dynamics = problem.stages[k].dynamics;
-    states[k].noalias() = dynamics.A.lazyProduct(*x);
-    states[k].noalias() += dynamics.B.lazyProduct(forces[k]);
-    states[k] += dynamics.g;
+    step(problem.stages[k].dynamics, problem.sizes.num_contacts, *x, forces[k], states[k]);
     x = &states[k];
   }
 
@@ -76,11 +95,14 @@ Residuals KktCheck::evaluate(const Problem& problem, const std::vector<ForceVect
     } else {
       costates_[k] = stage.Q.cwiseProduct(error);
       if (k + 1 < N) {
-        costates_[k].noalias() += problem.stages[k + 1].dynamics.A.transpose().lazyProduct(costates_[k + 1]);
+        add_A_transposed_times(problem.stages[k + 1].dynamics.A, costates_[k + 1], costates_[k]);
       }
     }
     gradient_[k] = stage.R.cwiseProduct(forces[k] - stage.f_ref);
-    gradient_[k].noalias() += stage.dynamics.B.transpose().lazyProduct(costates_[k]);
+    for (int c = 0; c < problem.sizes.num_contacts; ++c) {
+      gradient_[k].segment<3>(3 * c).noalias() +=
+          stage.dynamics.B.block<6, 3>(6, 3 * c).transpose().lazyProduct(costates_[k].tail<6>());
+    }
     if (!forces[k].allFinite() || !gradient_[k].allFinite()) return {kInfinity, kInfinity};
     for (int c = 0; c < problem.sizes.num_contacts; ++c) {
       const auto contact = static_cast<std::size_t>(c);

@@ -32,7 +32,16 @@ void multiply_transposed(const StageData& stage, X& x) {
 
 }  // namespace
 
-Condensed::Condensed(const Problem& problem, double typical_force) : typical_force_(typical_force) {
+Condensed::Condensed(const Sequence& sequence, int num_stages) : typical_force_(sequence.typical_force) {
+  Problem problem({num_stages, sequence.ticks.front().sizes.num_contacts});
+  sequence.cut(0, num_stages, problem);
+  list_contacts(problem);
+  const std::size_t number = contacts_.size();
+  for (std::size_t tick = 0; tick < sequence.ticks.size() && !all_contacts_; ++tick) {
+    sequence.cut(tick, num_stages, problem);
+    list_contacts(problem);
+    all_contacts_ = contacts_.size() != number;
+  }
   list_contacts(problem);
   response_.resize(problem.stages.size());
   error_.resize(problem.stages.size());
@@ -44,7 +53,8 @@ void Condensed::list_contacts(const Problem& problem) {
   contacts_.clear();
   for (std::size_t k = 0; k < problem.stages.size(); ++k) {
     for (int c = 0; c < problem.sizes.num_contacts; ++c) {
-      if (problem.stages[k].fz_max[static_cast<std::size_t>(c)] > 0.0) contacts_.push_back({static_cast<int>(k), c});
+      const bool stands = problem.stages[k].fz_max[static_cast<std::size_t>(c)] > 0.0;
+      if (stands || all_contacts_) contacts_.push_back({static_cast<int>(k), c});
     }
   }
   lower.resize(num_contacts());
@@ -58,7 +68,10 @@ void Condensed::list_contacts(const Problem& problem) {
 }
 
 void Condensed::update(const Problem& problem, bool matrices_changed) {
-  if (matrices_changed) hessian(problem);
+  if (matrices_changed) {
+    list_contacts(problem);
+    hessian(problem);
+  }
   gradient(problem);
 }
 

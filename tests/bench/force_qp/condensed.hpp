@@ -2,19 +2,20 @@
 // The force QP without its states, as dense solvers take it:   min 1/2 u'H u + q'u   s.t.   C u <= 0,  lower <= u_z <=
 // upper
 //
-// u: forces of the contacts in stance, in units of the typical force. C: four friction faces of each contact.
+// u: forces of the contacts in stance, in units of the typical force; where their number differs from tick to tick, of
+// all contacts, so that sizes stay. C: four friction faces of each contact.
 #include <Eigen/Core>
 #include <vector>
 
-#include "controller/force_qp/force_qp.hpp"
+#include "tests/bench/force_qp/sequence.hpp"
 
 namespace stance::bench {
 
 class Condensed {
  public:
-  Condensed(const force_qp::Problem& problem, double typical_force);
+  Condensed(const Sequence& sequence, int num_stages);
 
-  /// H (with the constraints' sizes as they were) and q, or q alone.
+  /// H, bounds and q, or q alone.
   void update(const force_qp::Problem& problem, bool matrices_changed);
   void forces(const force_qp::Problem& problem, const double* u, std::vector<force_qp::ForceVector>& out) const;
 
@@ -35,10 +36,18 @@ class Condensed {
   void gradient(const force_qp::Problem& problem);
 
   double typical_force_;  ///< N
+  bool all_contacts_ = false;
   std::vector<Contact> contacts_;
   using Column = Eigen::Matrix<double, 12, 3>;
   std::vector<Column> response_;  ///< of x_(k+1) to a contact's forces
   std::vector<force_qp::StateVector> error_;
 };
+
+/// Rows +x, -x, +y, -y of |u_x|, |u_y| <= mu u_z.
+inline Eigen::Matrix<double, 4, 3> friction_faces(double friction) {
+  Eigen::Matrix<double, 4, 3> rows;
+  rows << 1.0, 0.0, -friction, -1.0, 0.0, -friction, 0.0, 1.0, -friction, 0.0, -1.0, -friction;
+  return rows;
+}
 
 }  // namespace stance::bench

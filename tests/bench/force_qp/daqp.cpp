@@ -18,20 +18,16 @@ constexpr double kNone = 1e30;
 
 class Daqp final : public Engine {
  public:
-  Daqp(const Problem& first, double typical_force)
-      : condensed_(first, typical_force), m_(5 * condensed_.num_contacts()), n_(condensed_.num_variables()) {
+  Daqp(const Sequence& sequence, int num_stages)
+      : condensed_(sequence, num_stages), m_(5 * condensed_.num_contacts()), n_(condensed_.num_variables()) {
     rows_.setZero(m_, n_);
     upper_.setZero(m_);
     lower_.setConstant(m_, -kNone);
     for (int c = 0; c < condensed_.num_contacts(); ++c) {
-      for (int face = 0; face < 4; ++face) {
-        rows_(5 * c + face, 3 * c + face / 2) = face % 2 == 0 ? 1.0 : -1.0;
-        rows_(5 * c + face, 3 * c + 2) = -first.friction;
-      }
+      rows_.block<4, 3>(5 * c, 3 * c) = friction_faces(sequence.ticks.front().friction);
       rows_(5 * c + 4, 3 * c + 2) = 1.0;
-      upper_(5 * c + 4) = condensed_.upper(c);
-      lower_(5 * c + 4) = condensed_.lower(c);
     }
+    take_bounds();
     sense_.assign(static_cast<std::size_t>(m_), 0);
     x_.assign(static_cast<std::size_t>(n_), 0.0);
     multipliers_.assign(static_cast<std::size_t>(m_), 0.0);
@@ -56,6 +52,7 @@ class Daqp final : public Engine {
 
   bool solve(const Problem& problem, bool matrices_changed) override {
     condensed_.update(problem, matrices_changed);
+    if (matrices_changed) take_bounds();
     if (!is_set_up_) {
       is_set_up_ = true;
       if (setup_daqp(&problem_, &work_, nullptr) < 0) return false;
@@ -76,6 +73,13 @@ class Daqp final : public Engine {
   int iterations() const override { return result_.iter; }
 
  private:
+  void take_bounds() {
+    for (int c = 0; c < condensed_.num_contacts(); ++c) {
+      lower_(5 * c + 4) = condensed_.lower(c);
+      upper_(5 * c + 4) = condensed_.upper(c);
+    }
+  }
+
   Condensed condensed_;
   int m_, n_;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> rows_;
@@ -92,9 +96,7 @@ class Daqp final : public Engine {
 
 EngineKind daqp() {
   return {"daqp", "default settings, working set kept; where matrices change, reset and given again",
-          [](const Problem& first, double typical_force) -> std::unique_ptr<Engine> {
-            return std::make_unique<Daqp>(first, typical_force);
-          }};
+          &make_engine<Daqp>};
 }
 
 }  // namespace stance::bench

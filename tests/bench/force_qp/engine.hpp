@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "controller/force_qp/force_qp.hpp"
+#include "tests/bench/force_qp/sequence.hpp"
 
 namespace stance::bench {
 
@@ -25,8 +25,14 @@ class Engine {
 struct EngineKind {
   std::string name;
   std::string settings;  ///< as its authors advise, and told
-  std::unique_ptr<Engine> (*make)(const Problem& first, double typical_force);
+  /// For the first `num_stages` stages of the sequence's ticks.
+  std::unique_ptr<Engine> (*make)(const Sequence& sequence, int num_stages);
 };
+
+template <typename T>
+std::unique_ptr<Engine> make_engine(const Sequence& sequence, int num_stages) {
+  return std::make_unique<T>(sequence, num_stages);
+}
 
 /// Ours first; peers as far as they were there when the benchmark was configured.
 const std::vector<EngineKind>& engine_kinds();

@@ -102,7 +102,7 @@ class Trial {
     using Clock = std::chrono::steady_clock;
     Problem problem({num_stages_, sequence_->ticks.front().sizes.num_contacts});
     sequence_->cut(0, num_stages_, problem);
-    const auto engine = kind_->make(problem, sequence_->typical_force);
+    const auto engine = kind_->make(*sequence_, num_stages_);
     std::vector<ForceVector> forces(static_cast<std::size_t>(num_stages_),
                                     ForceVector::Zero(3 * problem.sizes.num_contacts));
     for (std::size_t tick = 0; tick < sequence_->ticks.size(); ++tick) {
@@ -189,6 +189,7 @@ int main(int argc, char** argv) {
   app.add_option("--push", recipe.push, "Strength of the pushes; 1: up to 50 N for 60 ms")
       ->check(CLI::Range(0.0, 100.0));
   app.add_option("--friction", recipe.friction, "mu")->check(CLI::Range(0.01, 2.0));
+  app.add_flag("--often", recipe.often, "Pushed every 0.5 s, not once in the middle");
   app.add_flag("--coupled", recipe.coupled, "With the coupling term and a dense terminal cost");
   app.add_option("--stages", stages, "Horizons N")->check(CLI::Range(1, 200));
   app.add_option("--engine", wanted, "Engines to measure; all without it");

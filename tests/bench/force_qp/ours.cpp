@@ -11,8 +11,9 @@ using namespace force_qp;
 template <Simd simd>
 class Structured final : public Engine {
  public:
-  Structured(const Problem& first, double typical_force)
-      : solver_(make_structured_solver(first.sizes, typical_force, Settings{}.max_iterations, simd)) {}
+  Structured(const Sequence& sequence, int num_stages)
+      : solver_(make_structured_solver({num_stages, sequence.ticks.front().sizes.num_contacts}, sequence.typical_force,
+                                       Settings{}.max_iterations, simd)) {}
   bool solve(const Problem& problem, bool matrices_changed) override {
     if (matrices_changed) {
       if (!solver_->take_matrices(problem)) return false;
@@ -33,10 +34,11 @@ class Structured final : public Engine {
 template <QpEngine which>
 class Certified final : public Engine {
  public:
-  Certified(const Problem& first, double typical_force) : solution_(first.sizes) {
+  Certified(const Sequence& sequence, int num_stages)
+      : solution_({num_stages, sequence.ticks.front().sizes.num_contacts}) {
     Settings settings;
     settings.engine = which;
-    engine_ = make_force_qp(settings, first.sizes, typical_force);
+    engine_ = make_force_qp(settings, {num_stages, sequence.ticks.front().sizes.num_contacts}, sequence.typical_force);
   }
   bool solve(const Problem& problem, bool) override { return engine_->solve(problem, solution_) == QpStatus::kSolved; }
   void forces(const Problem&, std::vector<ForceVector>& out) const override { out = solution_.forces; }
@@ -47,11 +49,6 @@ class Certified final : public Engine {
   Solution solution_;
 };
 
-template <typename T>
-std::unique_ptr<Engine> make(const Problem& first, double typical_force) {
-  return std::make_unique<T>(first, typical_force);
-}
-
 }  // namespace
 
 const std::vector<EngineKind>& engine_kinds() {
@@ -61,13 +58,13 @@ const std::vector<EngineKind>& engine_kinds() {
       if (simd == Simd::kPortable) continue;  // for its bits, not for its speed
       const bool wide = simd == Simd::kAvx512;
       all.push_back({wide ? "structured" : "structured-avx2", std::string("the solver alone, ") + name(simd),
-                     wide ? &make<Structured<Simd::kAvx512>> : &make<Structured<Simd::kAvx2>>});
+                     wide ? &make_engine<Structured<Simd::kAvx512>> : &make_engine<Structured<Simd::kAvx2>>});
     }
     all.push_back({"structured-certified", "with inspection and KKT check, as in the controller",
-                   &make<Certified<QpEngine::kStructured>>});
+                   &make_engine<Certified<QpEngine::kStructured>>});
     all.push_back({"osqp-condensed", "OSQP 1.0 with our set's correction, as in the controller",
-                   &make<Certified<QpEngine::kOsqpCondensed>>});
-    all.push_back({"osqp-sparse", "the same, sparse", &make<Certified<QpEngine::kOsqpSparse>>});
+                   &make_engine<Certified<QpEngine::kOsqpCondensed>>});
+    all.push_back({"osqp-sparse", "the same, sparse", &make_engine<Certified<QpEngine::kOsqpSparse>>});
     for (EngineKind& kind : peers()) all.push_back(std::move(kind));
     return all;
   }();

@@ -7,8 +7,14 @@ std::vector<EngineKind> peers() {
 #ifdef STANCE_BENCH_DAQP
       daqp(),
 #endif
-#ifdef STANCE_BENCH_CMEEL
-      eiquadprog(), qpoases(), proxqp(),
+#ifdef STANCE_BENCH_EIQUADPROG
+      eiquadprog(),
+#endif
+#ifdef STANCE_BENCH_QPOASES
+      qpoases(),
+#endif
+#ifdef STANCE_BENCH_PROXQP
+      proxqp(),
 #endif
 #ifdef STANCE_BENCH_PIQP
       piqp(),

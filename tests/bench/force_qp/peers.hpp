@@ -6,19 +6,12 @@ namespace stance::bench {
 
 std::vector<EngineKind> peers();
 
-#ifdef STANCE_BENCH_DAQP
+// Each in its own file; there where peers.cmake says so.
 EngineKind daqp();
-#endif
-#ifdef STANCE_BENCH_CMEEL
 EngineKind eiquadprog();
 EngineKind qpoases();
 EngineKind proxqp();
-#endif
-#ifdef STANCE_BENCH_PIQP
 EngineKind piqp();
-#endif
-#ifdef STANCE_BENCH_HPIPM
 EngineKind hpipm();
-#endif
 
 }  // namespace stance::bench

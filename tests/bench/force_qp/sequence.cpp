@@ -23,6 +23,7 @@ constexpr double kHeight = 0.55;           // m
 constexpr double kSpeed = 0.3;             // m/s, of walking
 constexpr double kMaxNormalForce = 250.0;  // N
 constexpr double kForceWeight = 1e-5;
+constexpr int kPushTicks = 6;
 constexpr int kLoopStages = 30;  // of the QP that closes the loop
 const StateVector kStateWeights = (StateVector() << 200, 200, 100, 100, 100, 500, 1, 1, 1, 10, 10, 10).finished();
 const Matrix3 kInertia = Vector3(0.25, 0.22, 0.08).asDiagonal();  // kg m^2, in B
@@ -300,11 +301,12 @@ Sequence record(const Recipe& recipe, int max_stages) {
       force += f.segment<3>(3 * c);
       torque += (foot - x.segment<3>(3)).cross(f.segment<3>(3 * c));
     }
-    if (tick % 50 == 20) {
+    const int since_push = recipe.often ? (tick + 30) % 50 : tick - kTicks / 2;
+    if (since_push == 0) {
       push_force = recipe.push * any({50.0, 50.0, 40.0});
       push_torque = recipe.push * any({1.5, 1.5, 0.5});
     }
-    if (tick % 50 >= 20 && tick % 50 < 26 && tick < 190) {
+    if (since_push >= 0 && since_push < kPushTicks && tick < kTicks - 50) {
       force += push_force;
       torque += push_torque;
     }

@@ -14,7 +14,8 @@ enum class Motion { kStand, kWalk, kFourFeet };
 struct Recipe {
   Motion motion = Motion::kStand;
   unsigned seed = 1;
-  double push = 1.0;      ///< of up to 50 N and 1.5 N m for 60 ms, every 0.5 s
+  double push = 1.0;      ///< of up to 50 N and 1.5 N m for 60 ms
+  bool often = false;     ///< pushed every 0.5 s, not once in the middle
   double friction = 0.6;  ///< mu
   bool coupled = false;   ///< with the coupling term and a dense terminal cost
 };

@@ -1,0 +1,74 @@
+// ProxQP: proximal augmented Lagrangian on the condensed problem, dense, warm-started with the last result.
+#include <proxsuite/proxqp/dense/dense.hpp>
+
+#include "tests/bench/force_qp/condensed.hpp"
+#include "tests/bench/force_qp/peers.hpp"
+
+namespace stance::bench {
+namespace {
+
+using namespace proxsuite;
+
+constexpr double kAccuracy = 1e-9;
+constexpr double kNone = 1e20;
+
+class ProxQp final : public Engine {
+ public:
+  ProxQp(const Sequence& sequence, int num_stages)
+      : condensed_(sequence, num_stages),
+        m_(4 * condensed_.num_contacts()),
+        n_(condensed_.num_variables()),
+        solver_(n_, 0, m_, true, proxqp::HessianType::Dense, proxqp::DenseBackend::Automatic) {
+    rows_.setZero(m_, n_);
+    row_lower_.setConstant(m_, -kNone);
+    row_upper_.setZero(m_);
+    lower_.setConstant(n_, -kNone);
+    upper_.setConstant(n_, kNone);
+    for (int c = 0; c < condensed_.num_contacts(); ++c) {
+      rows_.block<4, 3>(4 * c, 3 * c) = friction_faces(sequence.ticks.front().friction);
+    }
+    solver_.settings.eps_abs = kAccuracy;
+    solver_.settings.eps_rel = 0.0;
+    solver_.settings.initial_guess = proxqp::InitialGuessStatus::WARM_START_WITH_PREVIOUS_RESULT;
+  }
+  bool solve(const Problem& problem, bool matrices_changed) override {
+    condensed_.update(problem, matrices_changed);
+    if (matrices_changed) {
+      for (int c = 0; c < condensed_.num_contacts(); ++c) {
+        lower_(3 * c + 2) = condensed_.lower(c);
+        upper_(3 * c + 2) = condensed_.upper(c);
+      }
+    }
+    if (!is_set_up_) {
+      is_set_up_ = true;
+      solver_.init(condensed_.H, condensed_.q, nullopt, nullopt, rows_, row_lower_, row_upper_, lower_, upper_);
+    } else if (matrices_changed) {
+      solver_.update(condensed_.H, condensed_.q, nullopt, nullopt, nullopt, nullopt, nullopt, lower_, upper_, false);
+    } else {
+      solver_.update(nullopt, condensed_.q, nullopt, nullopt, nullopt, nullopt, nullopt, nullopt, nullopt, false);
+    }
+    solver_.solve();
+    return solver_.results.info.status == proxqp::QPSolverOutput::PROXQP_SOLVED;
+  }
+  void forces(const Problem& problem, std::vector<ForceVector>& out) const override {
+    condensed_.forces(problem, solver_.results.x.data(), out);
+  }
+  int iterations() const override { return static_cast<int>(solver_.results.info.iter); }
+
+ private:
+  Condensed condensed_;
+  int m_, n_;
+  Eigen::MatrixXd rows_;
+  Eigen::VectorXd row_lower_, row_upper_, lower_, upper_;
+  proxqp::dense::QP<double> solver_;
+  bool is_set_up_ = false;
+};
+
+}  // namespace
+
+EngineKind proxqp() {
+  return {"proxqp", "dense, automatic backend, eps_abs 1e-9, warm start with the previous result",
+          &make_engine<ProxQp>};
+}
+
+}  // namespace stance::bench
