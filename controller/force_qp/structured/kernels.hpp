@@ -252,7 +252,8 @@ inline bool factor_stage(const Stage<NC>& s, const Stage<NC>* before, const Cost
   }
   if (before == nullptr) return true;
 
-  // A'P A - K' Qux + Q, column by column: j of pose, j of rate
+  // A'P A - K' Qux + Q, column by column: j of pose, j of rate; the rate-pose block is the transpose of pose-rate
+  Vec rate_rows[2][4];
   for (int j = 0; j < 6; ++j) {
     const int block = j / 3 * 3;
     Vec PA_pose_pose = load(next.pose_pose[j]);
@@ -273,22 +274,27 @@ inline bool factor_stage(const Stage<NC>& s, const Stage<NC>* before, const Cost
     }
     Vec pose_pose = add_Ct_times(s, PA_pose_pose, PA_rate_pose);
     Vec pose_rate = add_Ct_times(s, PA_pose_rate, PA_rate_rate);
-    Vec rate_pose = Dt_times(s, PA_pose_pose) + PA_rate_pose;
     Vec rate_rate = Dt_times(s, PA_pose_rate) + PA_rate_rate;
     for (int c = 0; c < U; ++c) {
-      const Vec pose = entry(Qux_pose[c], j);
       const Vec rate = entry(Qux_rate[c], j);
-      pose_pose = subtract_product(pose_pose, K_pose[c], pose);
+      pose_pose = subtract_product(pose_pose, K_pose[c], entry(Qux_pose[c], j));
       pose_rate = subtract_product(pose_rate, K_pose[c], rate);
-      rate_pose = subtract_product(rate_pose, K_rate[c], pose);
       rate_rate = subtract_product(rate_rate, K_rate[c], rate);
     }
     store(cost.pose_pose[j], pose_pose);
     store(cost.pose_rate[j], pose_rate);
-    store(cost.rate_pose[j], rate_pose);
     store(cost.rate_rate[j], rate_rate);
     cost.pose_pose[j].v[lane_of(j)] += before->Q_pose.v[lane_of(j)];
     cost.rate_rate[j].v[lane_of(j)] += before->Q_rate.v[lane_of(j)];
+    rate_rows[j / 3][j % 3] = pose_rate;
+  }
+  for (Vec(&rows)[4] : rate_rows) {
+    rows[3] = zeros();
+    transpose_halves(rows);
+  }
+  for (int i = 0; i < 3; ++i) {
+    store(cost.rate_pose[i], low_halves(rate_rows[0][i], rate_rows[1][i]));
+    store(cost.rate_pose[3 + i], high_halves(rate_rows[0][i], rate_rows[1][i]));
   }
   return true;
 }

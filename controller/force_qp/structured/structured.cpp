@@ -237,7 +237,7 @@ class Solver final : public StructuredSolver {
 
   void take_terminal_cost(const Problem& problem) noexcept {
     Cost& P = w_.terminal;
-    P = Cost{};
+    if (w_.has_terminal_cost && !problem.has_terminal_cost) P = Cost{};  // off the diagonal it is zero else
     w_.has_terminal_cost = problem.has_terminal_cost;
     for (int j = 0; j < 6; ++j) {
       if (problem.has_terminal_cost) {
