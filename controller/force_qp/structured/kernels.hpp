@@ -253,7 +253,10 @@ inline bool factor_stage(const Stage<NC>& s, const Stage<NC>* before, const Cost
   if (before == nullptr) return true;
 
   // A'P A - K' Qux + Q, column by column: j of pose, j of rate; the rate-pose block is the transpose of pose-rate
+  static constexpr Lanes kUnit[6] = {
+      {{1.0}}, {{0.0, 1.0}}, {{0.0, 0.0, 1.0}}, {{0, 0, 0, 0, 1.0}}, {{0, 0, 0, 0, 0, 1.0}}, {{0, 0, 0, 0, 0, 0, 1.0}}};
   Vec rate_rows[2][4];
+#pragma GCC unroll 6
   for (int j = 0; j < 6; ++j) {
     const int block = j / 3 * 3;
     Vec PA_pose_pose = load(next.pose_pose[j]);
@@ -281,11 +284,9 @@ inline bool factor_stage(const Stage<NC>& s, const Stage<NC>* before, const Cost
       pose_rate = subtract_product(pose_rate, K_pose[c], rate);
       rate_rate = subtract_product(rate_rate, K_rate[c], rate);
     }
-    store(cost.pose_pose[j], pose_pose);
+    store(cost.pose_pose[j], add_product(pose_pose, load(before->Q_pose), load(kUnit[j])));
     store(cost.pose_rate[j], pose_rate);
-    store(cost.rate_rate[j], rate_rate);
-    cost.pose_pose[j].v[lane_of(j)] += before->Q_pose.v[lane_of(j)];
-    cost.rate_rate[j].v[lane_of(j)] += before->Q_rate.v[lane_of(j)];
+    store(cost.rate_rate[j], add_product(rate_rate, load(before->Q_rate), load(kUnit[j])));
     rate_rows[j / 3][j % 3] = pose_rate;
   }
   for (Vec(&rows)[4] : rate_rows) {
