@@ -4,6 +4,7 @@
 #include <Eigen/QR>
 #include <algorithm>
 #include <catch2/catch_test_macros.hpp>
+#include <cmath>
 #include <random>
 
 #include "controller/force_qp/kkt.hpp"
@@ -202,6 +203,52 @@ TEST_CASE("FarFromTheOriginNothingIsLost") {
     REQUIRE(make(far.sizes)->solve(far, there) == QpStatus::kSolved);
     CHECK(force_error(here.forces, there.forces) <= 1e-5);  // what rounding x itself to 1e-13 m costs
   }
+}
+
+TEST_CASE("RandomProblemsAreSolvedExactlyOrRefused") {
+  // Well and ill scaled, feet under the centre of mass or on one spot, mu from 0.05 to 1.5, from calm to far beyond
+  // what the feet can do. The check in the engine is the proof: without a fallback, kSolved means exact.
+  constexpr int kProblems = 20000;
+  constexpr int kMayBeRefused = kProblems / 1000;
+  Settings settings;
+  settings.engine = QpEngine::kStructured;
+  settings.fallback_iterations = 0;
+  std::mt19937_64 random(28);
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  const auto log_uniform = [&](double low, double high) { return low * std::pow(high / low, uniform(random)); };
+  std::vector<std::unique_ptr<ForceQp>> engines;
+  for (const int num_contacts : {1, 2, 3, 4}) engines.push_back(make_force_qp(settings, {8, num_contacts}, kWeight));
+  int refused = 0;
+  int active = 0;
+  for (int repeat = 0; repeat < kProblems; ++repeat) {
+    const int num_contacts = 1 + repeat % 4;
+    Problem problem = uniform(random) < 0.3 ? any_problem({8, num_contacts}, random) : standing(8, num_contacts);
+    problem.friction = log_uniform(0.05, 1.5);
+    disturb(problem, log_uniform(0.1, 300.0), random);
+    const double R_scale = log_uniform(1e-3, 1e2);
+    const double Q_scale = log_uniform(1e-2, 1e2);
+    const double kind = uniform(random);
+    for (StageData& stage : problem.stages) {
+      stage.R *= R_scale;
+      stage.Q *= Q_scale;
+      if (kind < 0.2) stage.dynamics.B.block(6, 0, 2, 3 * num_contacts).setZero();  // no arm about x and y
+      if (kind > 0.8 && num_contacts > 1) stage.dynamics.B.middleCols(3, 3) = stage.dynamics.B.leftCols(3);
+    }
+    Solution solution(problem.sizes);
+    ForceQp& engine = *engines[static_cast<std::size_t>(num_contacts - 1)];
+    if (uniform(random) < 0.5) engine.reset();
+    const QpStatus status = engine.solve(problem, solution);
+    active += solution.iterations > 0;
+    if (status != QpStatus::kSolved) {
+      ++refused;
+      continue;
+    }
+    const Residuals residuals = KktCheck(problem.sizes).evaluate(problem, solution.forces, solution.states);
+    CHECK(residuals.primal <= kForceTolerance);
+    CHECK(residuals.dual <= kForceTolerance);
+  }
+  CHECK(active > kProblems / 4);
+  CHECK(refused <= kMayBeRefused);
 }
 
 TEST_CASE("RefinementMendsWhatRoundingSpoils") {

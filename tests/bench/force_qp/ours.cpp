@@ -31,13 +31,15 @@ class Structured final : public Engine {
 };
 
 /// An engine as the controller uses it: inspection, certificate and all.
-template <QpEngine which>
+template <QpEngine which, bool alone = false>
 class Certified final : public Engine {
  public:
   Certified(const Sequence& sequence, int num_stages)
       : solution_({num_stages, sequence.ticks.front().sizes.num_contacts}) {
     Settings settings;
     settings.engine = which;
+    settings.try_free_minimiser = !alone;
+    settings.correct_active_set = !alone;
     engine_ = make_force_qp(settings, {num_stages, sequence.ticks.front().sizes.num_contacts}, sequence.typical_force);
   }
   bool solve(const Problem& problem, bool) override { return engine_->solve(problem, solution_) == QpStatus::kSolved; }
@@ -62,9 +64,12 @@ const std::vector<EngineKind>& engine_kinds() {
     }
     all.push_back({"structured-certified", "with inspection and KKT check, as in the controller",
                    &make_engine<Certified<QpEngine::kStructured>>});
-    all.push_back({"osqp-condensed", "OSQP 1.0 with our set's correction, as in the controller",
+    all.push_back({"osqp-condensed",
+                   "OSQP 1.0 between our free minimiser and our correction of its set, as in the controller",
                    &make_engine<Certified<QpEngine::kOsqpCondensed>>});
     all.push_back({"osqp-sparse", "the same, sparse", &make_engine<Certified<QpEngine::kOsqpSparse>>});
+    all.push_back({"osqp", "OSQP 1.0 alone, sparse, eps 1e-6, rho 1 (adaptive), check every 10",
+                   &make_engine<Certified<QpEngine::kOsqpSparse, true>>});
     for (EngineKind& kind : peers()) all.push_back(std::move(kind));
     return all;
   }();
