@@ -7,25 +7,43 @@ namespace {
 
 constexpr double kSymmetryTolerance = 1e-9;  // relative to the largest entry
 
+// Each as one sum, which is vectorised: a NaN or an infinity makes it a NaN, which equals nothing.
+template <typename X>
+bool all_finite(const Eigen::DenseBase<X>& x) noexcept {
+  return (0.0 * x.derived().array()).sum() == 0.0;
+}
+template <typename X>
+bool all_zero(const Eigen::MatrixBase<X>& x) noexcept {
+  return x.cwiseAbs().sum() == 0.0;
+}
+template <typename X, typename Y>
+bool same(const Eigen::MatrixBase<X>& x, const Eigen::MatrixBase<Y>& y) noexcept {
+  return all_zero(x - y);
+}
+
+/// One where A = [I 0 D 0; 0 I 0 E; 0 C I 0; 0 0 0 I] has an entry of the identity, zero in D, E and C.
+const StateMatrix kFixed = [] {
+  StateMatrix fixed = StateMatrix::Ones();
+  fixed.block<3, 3>(0, 6).setZero();
+  fixed.block<3, 3>(3, 9).setZero();
+  fixed.block<3, 3>(6, 3).setZero();
+  return fixed;
+}();
+
 bool has_structure(const StateMatrix& A) noexcept {
-  // A = [I 0 D 0; 0 I 0 E; 0 C I 0; 0 0 0 I]
-  return A.block<3, 3>(0, 0).isIdentity(0.0) && A.block<3, 3>(3, 3).isIdentity(0.0) &&
-         A.block<3, 3>(6, 6).isIdentity(0.0) && A.block<3, 3>(9, 9).isIdentity(0.0) &&
-         A.block<3, 3>(0, 3).isZero(0.0) && A.block<3, 3>(0, 9).isZero(0.0) && A.block<3, 3>(3, 0).isZero(0.0) &&
-         A.block<3, 3>(3, 6).isZero(0.0) && A.block<3, 3>(6, 0).isZero(0.0) && A.block<3, 3>(6, 9).isZero(0.0) &&
-         A.block<3, 9>(9, 0).isZero(0.0);
+  return all_zero((A - StateMatrix::Identity()).cwiseProduct(kFixed));
 }
 
 bool is_valid(const StageData& stage, int num_contacts) noexcept {
   const Dynamics& dynamics = stage.dynamics;
   const int num_forces = 3 * num_contacts;
   if (dynamics.B.cols() != num_forces || stage.f_ref.size() != num_forces || stage.R.size() != num_forces) return false;
-  if (!dynamics.A.allFinite() || !dynamics.B.allFinite() || !dynamics.g.allFinite() || !stage.x_ref.allFinite() ||
-      !stage.f_ref.allFinite() || !stage.Q.allFinite() || !stage.R.allFinite()) {
+  if (!all_finite(dynamics.A) || !all_finite(dynamics.B) || !all_finite(dynamics.g) || !all_finite(stage.x_ref) ||
+      !all_finite(stage.f_ref) || !all_finite(stage.Q) || !all_finite(stage.R)) {
     return false;
   }
-  if (!has_structure(dynamics.A) || !dynamics.B.topRows<6>().isZero(0.0)) return false;
-  if (!(stage.R.array() > 0.0).all() || !(stage.Q.array() >= 0.0).all()) return false;
+  if (!has_structure(dynamics.A) || !all_zero(dynamics.B.topRows<6>())) return false;
+  if (!(stage.R.minCoeff() > 0.0) || !(stage.Q.minCoeff() >= 0.0)) return false;
   for (std::size_t c = 0; c < static_cast<std::size_t>(num_contacts); ++c) {
     if (!std::isfinite(stage.fz_min[c]) || !std::isfinite(stage.fz_max[c]) || stage.fz_min[c] > stage.fz_max[c]) {
       return false;
@@ -62,12 +80,13 @@ QpStatus inspect(const Problem& problem, Sizes sizes) noexcept {
 
 bool matrices_differ(const Problem& a, const Problem& b) noexcept {
   if (a.friction != b.friction || a.has_terminal_cost != b.has_terminal_cost) return true;
-  if (a.has_terminal_cost && a.terminal_cost != b.terminal_cost) return true;
+  if (a.has_terminal_cost && !same(a.terminal_cost, b.terminal_cost)) return true;
   for (std::size_t k = 0; k < a.stages.size(); ++k) {
     const StageData& now = a.stages[k];
     const StageData& before = b.stages[k];
-    if (now.dynamics.A != before.dynamics.A || now.dynamics.B != before.dynamics.B || now.Q != before.Q ||
-        now.R != before.R || now.fz_min != before.fz_min || now.fz_max != before.fz_max) {
+    if (!same(now.dynamics.A, before.dynamics.A) || !same(now.dynamics.B, before.dynamics.B) ||
+        !same(now.Q, before.Q) || !same(now.R, before.R) || now.fz_min != before.fz_min ||
+        now.fz_max != before.fz_max) {
       return true;
     }
   }
