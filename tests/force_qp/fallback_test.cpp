@@ -43,7 +43,6 @@ class Liar final : public StructuredSolver {
   void refine() noexcept override {}
   void take_ahead() noexcept override { honest_->take_ahead(); }
   int iterations() const noexcept override { return honest_->iterations(); }
-  int active() const noexcept override { return honest_->active(); }
   void forces(std::vector<ForceVector>& out) const noexcept override {
     honest_->forces(out);
     out.back()(2) += error_;

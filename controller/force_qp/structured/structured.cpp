@@ -176,7 +176,6 @@ class Solver final : public StructuredSolver {
   void refine() noexcept override { path_.refine(w_); }
   void take_ahead() noexcept override { path_.take_ahead(w_); }
   int iterations() const noexcept override { return w_.iterations; }
-  int active() const noexcept override { return w_.active; }
 
   void forces(std::vector<ForceVector>& out) const noexcept override {
     for (std::size_t k = 0; k < num_stages(); ++k) {

@@ -74,8 +74,6 @@ class StructuredSolver {
   virtual void take_ahead() noexcept = 0;
   /// Passes and steps of the last solve; 0 where the first guess was right.
   virtual int iterations() const noexcept = 0;
-  /// Active constraints of the last solve.
-  virtual int active() const noexcept = 0;
   /// f_0..f_(N-1), N, of the last solve; exactly zero in swing.
   virtual void forces(std::vector<ForceVector>& out) const noexcept = 0;
   /// The next solve starts from no active constraint.
