@@ -34,7 +34,7 @@ bool names(const std::string& message, const std::string& key) {
 }  // namespace
 
 TEST_CASE("EveryScenarioOfTheBipedLoads") {
-  for (const char* name : {"demo", "stand", "stand_noisy", "single_body"}) {
+  for (const char* name : {"stand", "stand_noisy", "single_body", "stepping", "walk", "walk_noisy"}) {
     const Scenario scenario = load_scenario("biped", name, 1);
     CHECK(scenario.duration == 20.0);
     CHECK(scenario.robot == "biped");
@@ -42,11 +42,13 @@ TEST_CASE("EveryScenarioOfTheBipedLoads") {
   }
 }
 
-TEST_CASE("TheDemoPushesHalfANewtonSecondForwardAndThreeSideways") {
+TEST_CASE("TheDemoPushesHalfANewtonSecondForwardThreeSidewaysAndAWalkerByEight") {
   const Scenario scenario = load_scenario("biped", "demo", 1);
-  REQUIRE(scenario.pushes.size() == 2);
+  REQUIRE(scenario.pushes.size() == 3);
   CHECK((scenario.pushes[0].force_W * scenario.pushes[0].duration - Vector3(0.5, 0.0, 0.0)).norm() < 1e-12);
   CHECK((scenario.pushes[1].force_W * scenario.pushes[1].duration - Vector3(0.0, 3.0, 0.0)).norm() < 1e-12);
+  CHECK(std::abs(scenario.pushes[2].force_W.norm() * scenario.pushes[2].duration - 8.0) < 1e-12);
+  CHECK(behaviour_name(scenario.commands.back()) == "stand");
   CHECK(scenario.command_delay_steps == 1);
   CHECK(scenario.sensors.delay_steps == 1);
   CHECK(scenario.sensors.contact_delay_steps == 5);
@@ -56,7 +58,7 @@ TEST_CASE("TheDemoPushesHalfANewtonSecondForwardAndThreeSideways") {
 }
 
 TEST_CASE("ScenarioErrorsNameTheKey") {
-  CHECK(names(error_of("duration: 20.0", "durration: 20.0"), "duration is missing"));
+  CHECK(names(error_of("duration: 48.0", "durration: 48.0"), "duration is missing"));
   CHECK(names(error_of("friction: 0.7", "friction: 0.7\nfrictoin: 0.7"), "frictoin"));
   CHECK(names(error_of("friction: 0.7", "friction: -0.1"), "friction is -0.1"));
   CHECK(names(error_of("friction: 0.7", "friction: .nan"), "friction"));
@@ -90,8 +92,8 @@ TEST_CASE("APushMayBeGivenByItsImpulseAndDirection") {
 }
 
 TEST_CASE("CommandsMayCease") {
-  std::string text = text_of("demo");
-  const auto scenario = scenario_from_text(text + "  - {time: 5.0, behaviour: silent}\n", "demo.yaml", 1);
+  const std::string text = text_of("stand");
+  const auto scenario = scenario_from_text(text + "  - {time: 5.0, behaviour: silent}\n", "stand.yaml", 1);
   REQUIRE(scenario.commands.size() == 2);
   CHECK_FALSE(scenario.commands[0].silent);
   CHECK(scenario.commands[1].silent);
