@@ -150,10 +150,11 @@ std::string as_json(const Summary& s) {
       << ", \"first_fall_s\": " << (s.fallen() ? number(s.duration) : "null")
       << ", \"fall_reason\": " << (s.fallen() ? quoted(name_of(s.fall)) : "null")
       << ", \"fallen_on\": " << (s.fallen_on.empty() ? "null" : quoted(s.fallen_on))
-      << ", \"max_tilt_rad\": " << number(s.max_tilt) << ", \"qp_failures\": " << s.qp_failures
-      << ", \"qp_iterations_max\": " << s.qp_iterations_max << ", \"steps\": " << s.steps
-      << ", \"p_WB\": " << list(s.p_WB) << ", \"segments\": [" << parts << "], \"tick_cpu\": " << as_json(s.tick_cpu)
-      << ", \"command_hash\": \"" << std::hex << s.command_hash << "\"}\n";
+      << ", \"lying\": " << (s.lying ? "true" : "false") << ", \"max_tilt_rad\": " << number(s.max_tilt)
+      << ", \"qp_failures\": " << s.qp_failures << ", \"qp_iterations_max\": " << s.qp_iterations_max
+      << ", \"steps\": " << s.steps << ", \"p_WB\": " << list(s.p_WB) << ", \"segments\": [" << parts
+      << "], \"tick_cpu\": " << as_json(s.tick_cpu) << ", \"command_hash\": \"" << std::hex << s.command_hash
+      << "\"}\n";
   return out.str();
 }
 
@@ -164,7 +165,7 @@ std::string as_text(const Summary& s) {
     out << "fell at " << s.duration << " s (" << name_of(s.fall) << (s.fallen_on.empty() ? "" : ": ") << s.fallen_on
         << ")";
   } else {
-    out << "no fall in " << s.duration << " s";
+    out << (s.lying ? "lay down, " : "") << "no fall in " << s.duration << " s";
   }
   out << "; largest tilt of the trunk " << s.max_tilt * degrees << " deg; " << s.steps << " steps; " << s.qp_failures
       << " failed QPs; ticks of " << std::setprecision(3) << s.tick_cpu.p50 << " us (median), " << s.tick_cpu.p99_9
@@ -218,6 +219,7 @@ Summary Observer::summary(std::uint64_t seed, double wall) const {
   summary.wall = wall;
   summary.fall = simulator_.fall();
   summary.fallen_on = simulator_.fallen_on();
+  summary.lying = simulator_.lying();
   summary.p_WB = {truth.p_WB[0], truth.p_WB[1], truth.p_WB[2]};
   summary.segments = segments(scenario_.commands, path_);
   summary.tick_cpu = tick_cpu(cpu_us_);

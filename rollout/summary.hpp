@@ -54,6 +54,7 @@ struct Summary {
   double wall = 0.0;      ///< s
   kinematics::Fall fall = kinematics::Fall::kNone;
   std::string fallen_on;  ///< the link, where a body is on the ground
+  bool lying = false;     ///< since it was told to lie down
   double max_tilt = 0.0;  ///< rad, of the trunk
   std::int64_t qp_failures = 0;
   int qp_iterations_max = 0;

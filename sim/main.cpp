@@ -16,7 +16,10 @@ namespace {
 void print_summary(const stance::sim::Simulator& simulator, const stance::sim::NodeReport& report, bool real_time) {
   const auto& refused = simulator.refused();
   std::fprintf(stderr, "stance-sim: %.2f s simulated; the robot %s; %lld commands refused", simulator.time(),
-               simulator.fallen() ? "fell" : "did not fall", static_cast<long long>(refused.total()));
+               simulator.fallen()  ? "fell"
+               : simulator.lying() ? "lay down"
+                                   : "did not fall",
+               static_cast<long long>(refused.total()));
   if (refused.total() > 0) {
     std::fprintf(stderr, " (stale %lld, not finite %lld, order %lld, run %lld)", static_cast<long long>(refused.stale),
                  static_cast<long long>(refused.not_finite), static_cast<long long>(refused.order),

@@ -73,6 +73,7 @@ Node::Node(lcm::LCM& lcm, Simulator& simulator, std::vector<std::uint8_t> run_in
   lcm_.subscribeFunction("JOINT_COMMAND", &Node::on_command, this)->setQueueCapacity(queue);
   lcm_.subscribeFunction("FORCE_PLAN", &Node::on_plan, this)->setQueueCapacity(queue);
   lcm_.subscribeFunction("PUSH", &Node::on_push, this)->setQueueCapacity(queue);
+  lcm_.subscribeFunction(kUserCommand, &Node::on_user_command, this)->setQueueCapacity(queue);
 }
 
 void Node::on_command(const Buffer*, const std::string&, const stance_msgs::joint_command_t* command, Node* node) {
@@ -89,6 +90,10 @@ void Node::on_plan(const Buffer*, const std::string&, const stance_msgs::force_p
 
 void Node::on_push(const Buffer*, const std::string&, const stance_msgs::push_t* push, Node* node) {
   node->simulator_.accept(*push);
+}
+
+void Node::on_user_command(const Buffer*, const std::string&, const stance_msgs::user_command_t* command, Node* node) {
+  node->simulator_.hear(*command);
 }
 
 void Node::publish_state() {

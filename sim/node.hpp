@@ -63,6 +63,8 @@ class Node {
   static void on_command(const Buffer*, const std::string&, const stance_msgs::joint_command_t* command, Node* node);
   static void on_plan(const Buffer*, const std::string&, const stance_msgs::force_plan_t* plan, Node* node);
   static void on_push(const Buffer*, const std::string&, const stance_msgs::push_t* push, Node* node);
+  static void on_user_command(const Buffer*, const std::string&, const stance_msgs::user_command_t* command,
+                              Node* node);
   void publish_instant();
   void publish_state();
   void publish_truth();

@@ -15,6 +15,7 @@ using stance_msgs::force_plan_t;
 using stance_msgs::joint_command_t;
 using stance_msgs::push_t;
 using stance_msgs::truth_t;
+using stance_msgs::user_command_t;
 
 constexpr std::int64_t kPeriodUs = 10'000;
 static_assert(kControlPeriod == static_cast<double>(kPeriodUs) * 1e-6);
@@ -202,9 +203,10 @@ void Simulator::step(Sums& sums) {
   const ContactVectors foot_force = plant([](const auto& p) { return p.foot_force_W(); });
   sensors_->step(before, plant(state), world_ ? foot_force : felt_by_single_body());
   const int body = plant([](const auto& p) { return p.body_on_ground(); });
-  if (body >= 0 && num_contacts_ > 0 && fall_ == Fall::kNone) {
-    fall_ = Fall::kBodyOnGround;
-    fallen_on_ = robot_.model.bodies[static_cast<std::size_t>(body)].name;
+  if (body >= 0 && num_contacts_ > 0) {
+    const bool first = fall_ == Fall::kNone;
+    judge_fall(Fall::kBodyOnGround);
+    if (first && fallen()) fallen_on_ = robot_.model.bodies[static_cast<std::size_t>(body)].name;
   }
   sums.torque += torque / kStepsPerPeriod;
   sums.push += push.force / kStepsPerPeriod;
@@ -219,12 +221,17 @@ void Simulator::advance() {
   write_messages(sums);
 }
 
-void Simulator::judge_fall() noexcept {
-  if (num_contacts_ == 0 || fall_ != Fall::kNone) return;
-  const rigid_body::State now = plant([](const auto& p) { return p.state(); });
-  const ContactVectors tips = plant([](const auto& p) { return p.foot_tips_W(); });
-  fall_ = kinematics::fall_of(robot_.fallen, now.R_WB, now.p_WB, std::span(tips).first(num_contacts_),
-                              robot_.feet.front().radius);
+void Simulator::hear(const user_command_t& command) noexcept {
+  told_to_lie_ = command.behaviour == user_command_t::LIE_DOWN;
+}
+
+void Simulator::judge_fall(Fall fall) noexcept {
+  if (fall == Fall::kNone || fallen() || lying_) return;
+  if (told_to_lie_ && commands_.current.mode == joint_command_t::DAMP) {
+    lying_ = true;
+  } else {
+    fall_ = fall;
+  }
 }
 
 void Simulator::write_messages(const Sums& sums) noexcept {
@@ -272,7 +279,10 @@ void Simulator::write_messages(const Sums& sums) noexcept {
   }
   copy(sums.push, truth_.push_W);
   truth_.drives_damped = drives_damped_ ? 1 : 0;
-  judge_fall();
+  if (num_contacts_ > 0) {
+    judge_fall(kinematics::fall_of(robot_.fallen, now.R_WB, now.p_WB, std::span(tips).first(num_contacts_),
+                                   robot_.feet.front().radius));
+  }
   truth_.fallen = fallen() ? 1 : 0;
   truth_.refused_stale = refused().stale;
   truth_.refused_not_finite = refused().not_finite;
@@ -293,6 +303,7 @@ void Simulator::write_messages(const Sums& sums) noexcept {
   user_command_.velocity[1] = command.velocity.y();
   user_command_.yaw_rate = command.yaw_rate;
   user_command_.height_offset = command.height_offset;
+  hear(user_command_);
 }
 
 }  // namespace stance::sim

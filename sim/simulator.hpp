@@ -45,6 +45,8 @@ class Simulator {
   Acceptance accept(const stance_msgs::joint_command_t& command) noexcept;
   /// False where the plan is not of this run, of another robot's size, not finite, or older than one before it.
   bool accept(const stance_msgs::force_plan_t& plan) noexcept;
+  /// Whoever says it: a robot that is told to lie down, and whose drives damp for it, has not fallen.
+  void hear(const stance_msgs::user_command_t& command) noexcept;
   /// Starts now. False where it is not finite, not of this run, or too many are under way.
   bool accept(const stance_msgs::push_t& push) noexcept;
 
@@ -52,6 +54,8 @@ class Simulator {
   void advance();
 
   const RefusalCounts& refused() const { return gate_.refused(); }
+  /// It lies because it was told to.
+  bool lying() const { return lying_; }
   bool fallen() const { return fall_ != kinematics::Fall::kNone; }
   /// What the robot has fallen by, first.
   kinematics::Fall fall() const { return fall_; }
@@ -97,7 +101,7 @@ class Simulator {
   static Sums no_sums() noexcept;
   void step(Sums& sums);
   Wrench push_wrench(const rigid_body::State& state, double now) const noexcept;
-  void judge_fall() noexcept;
+  void judge_fall(kinematics::Fall fall) noexcept;
   void write_messages(const Sums& sums) noexcept;
 
   config::RobotDescription robot_;
@@ -121,6 +125,8 @@ class Simulator {
   bool drives_damped_ = false;
   kinematics::Fall fall_ = kinematics::Fall::kNone;
   std::string fallen_on_;
+  bool told_to_lie_ = false;
+  bool lying_ = false;
   std::size_t next_command_ = 0;
   bool user_command_due_ = false;
   stance_msgs::robot_state_t state_{};

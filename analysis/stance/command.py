@@ -24,7 +24,8 @@ from .messages import message_type
 PERIOD = 0.1  # s, well within the time after which a controller no longer believes a command
 CHANNEL = "USER_COMMAND"
 TAG_SIZE = 16  # bytes of the message's tag, which has no use here
-BEHAVIOURS = ("stand", "walk", "lie-down", "track", "catch")
+LIE_DOWN = "lie-down"
+BEHAVIOURS = ("stand", "walk", LIE_DOWN, "track", "catch")
 SILENT = "silent"  # of who commands, not of the robot
 
 
@@ -90,9 +91,10 @@ def publish(
     """Sends the command in force every PERIOD, until `duration` [s] has passed or it is `stopped`; then stands.
 
     `commands` in order of time; `connection` is an LCM. Each message leaves at an absolute deadline. Returns how many
-    were sent. However it ends, the last one is to stand.
+    were sent. However it ends, the last one is to stand; to lie down, where that was wanted.
     """
     sent = periods = 0
+    last = Command()
     begun = time.monotonic()
     try:
         while not stopped() and (duration is None or periods * PERIOD < duration - PERIOD / 2):
@@ -100,10 +102,11 @@ def publish(
             if due and due[-1].behaviour != SILENT:
                 connection.publish(CHANNEL, encode(due[-1]))
                 sent += 1
+                last = due[-1] if due[-1].behaviour == LIE_DOWN else Command()
             periods += 1
             time.sleep(max(0.0, begun + periods * PERIOD - time.monotonic()))
     finally:
-        connection.publish(CHANNEL, encode(Command()))
+        connection.publish(CHANNEL, encode(last))
     return sent + 1
 
 

@@ -97,7 +97,9 @@ void BipedController::step(const TickInput& input, StageClock& clock, TickOutput
     memory_.stepping ? walk_.model() : stand_.model();
     clock.stamp(Stage::kModel);
     // Where it fails, the last plan's forces stay.
-    if (!ladder_.latched()) {
+    if (memory_.lying) {
+      give_up(SafetyMode::kDamp, out);  // the trunk comes to rest on the ground
+    } else if (!ladder_.latched()) {
       const QpStatus status = memory_.stepping ? walk_.solve(out.plan, trace) : stand_.solve(out.plan, trace);
       if (status != QpStatus::kSolved) ladder_.report(Fault::kQpFailed);
     }
@@ -143,9 +145,11 @@ void BipedController::take_command(const TickInput& input) noexcept {
   UserCommand& taken = memory_.user_command;
   memory_.user_command_age += input.periods;
   if (command.seq != taken.seq) {
-    const bool offered = (command.behaviour == Behaviour::kStand || command.behaviour == Behaviour::kWalk) &&
-                         command.height_offset >= config_.height.offset_range[0] &&
-                         command.height_offset <= config_.height.offset_range[1];
+    // A robot that lies cannot get up.
+    const bool offered =
+        (memory_.lying ? command.behaviour == Behaviour::kLieDown : command.behaviour <= Behaviour::kLieDown) &&
+        command.height_offset >= config_.height.offset_range[0] &&
+        command.height_offset <= config_.height.offset_range[1];
     if (safety::command_is_plausible(command) && offered) {
       taken = command;
       memory_.user_command_age = 0;
@@ -154,9 +158,10 @@ void BipedController::take_command(const TickInput& input) noexcept {
       ladder_.report(Fault::kCommandInvalid);
     }
   }
-  // An operator who is heard no more wants nothing: not what was wanted last.
-  if (kControlPeriod * static_cast<double>(memory_.user_command_age) > config_.user_command_timeout) {
-    taken.behaviour = Behaviour::kStand;
+  // An operator who is heard no more no longer wants to walk. A robot on its way down goes on.
+  const double age = kControlPeriod * static_cast<double>(memory_.user_command_age);
+  if (taken.behaviour == Behaviour::kWalk && age > config_.user_command_timeout) taken.behaviour = Behaviour::kStand;
+  if (taken.behaviour != Behaviour::kWalk) {
     taken.velocity.setZero();
     taken.yaw_rate = 0.0;
   }
@@ -185,8 +190,8 @@ void BipedController::estimate(int periods, const RobotState& state, BaseEstimat
   rigid_body::centroidal(model_, body_.kinematics, body_.centroidal);
   rigid_body::mass_matrix(model_, body_.state, body_.mass_matrix);
   rigid_body::gravity_torques(model_, body_.state, body_.gravity);
-  if (kinematics::fall_of(config_.fallen, base.R_WB, base.p_WB, std::span(base.p_WF).first<kFeet>(), feet_[0].radius) !=
-      kinematics::Fall::kNone) {
+  if (!memory_.lying && kinematics::fall_of(config_.fallen, base.R_WB, base.p_WB, std::span(base.p_WF).first<kFeet>(),
+                                            feet_[0].radius) != kinematics::Fall::kNone) {
     ladder_.report(Fault::kRobotFallen);
   }
 }
@@ -234,7 +239,7 @@ void BipedController::plan(int periods, const RobotState& state, Trace& trace) n
   } else {
     stand(now, reference);
   }
-  trace.behaviour = memory_.stepping ? Behaviour::kWalk : Behaviour::kStand;
+  trace.behaviour = memory_.stepping ? Behaviour::kWalk : lying_down() ? Behaviour::kLieDown : Behaviour::kStand;
   trace.gait = GaitTrace{};
   if (memory_.stepping) walk_.note(trace.gait);
   trace.x = reference.x;
@@ -252,9 +257,11 @@ void BipedController::stand(const WalkInput& now, TickState& reference) noexcept
   where.L_C_W = body_.centroidal.L_C_W;
   const Vector3 radius(0.0, 0.0, feet_[0].radius);
   for (std::size_t i = 0; i < kFeet; ++i) where.p_WG[i] = now.p_WF[i] - radius;
-  where.height_offset = now.height_offset;
+  const double lowest = config_.height.offset_range[0];
+  where.height_offset = lying_down() ? lowest : now.height_offset;
   where.periods = now.periods;
   stand_.plan(where, reference);
+  memory_.lying = memory_.lying || (lying_down() && stand_.height_offset() <= lowest);
 }
 
 void BipedController::choose_behaviour(const WalkInput& now) noexcept {
@@ -264,6 +271,7 @@ void BipedController::choose_behaviour(const WalkInput& now) noexcept {
   const Vector2 xi = in_heading(now.p_WC + now.v_WC / walk_.gait().omega() - 0.5 * (now.p_WF[0] + now.p_WF[1]));
   const double pitch_soon = now.rpy.y() + c.capture_lead * in_heading(now.w_WB_W).y();
   const bool wanted = memory_.user_command.behaviour == Behaviour::kWalk;
+  if (memory_.lying) return;
   if (!memory_.stepping) {
     const bool pushed =
         std::abs(xi.x()) > c.capture.x() || std::abs(xi.y()) > c.capture.y() || std::abs(pitch_soon) > c.capture_pitch;

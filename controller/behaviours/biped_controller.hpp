@@ -37,7 +37,8 @@ class BipedController {
     double yaw = 0.0;                   ///< rad, unwrapped
     bool standing = false;              ///< the stance has been taken up
     bool stepping = false;
-    TickOutput last;  ///< what HOLD repeats
+    bool lying = false;  ///< let down: nothing but a new run ends it
+    TickOutput last;     ///< what HOLD repeats
   };
 
   void start_run(std::int64_t run_id) noexcept;
@@ -46,8 +47,9 @@ class BipedController {
   void estimate(int periods, const RobotState& state, BaseEstimate& base) noexcept;
   void plan(int periods, const RobotState& state, Trace& trace) noexcept;
   void stand(const WalkInput& now, TickState& reference) noexcept;
-  /// From standing to stepping and back.
+  /// From standing to stepping and back, and from standing to lying.
   void choose_behaviour(const WalkInput& now) noexcept;
+  bool lying_down() const noexcept { return memory_.user_command.behaviour == Behaviour::kLieDown; }
   std::array<LegTask, kFeet> leg_tasks(const ForcePlan& plan) const noexcept;
   estimation::ContactPlan contact_plan() const noexcept;
   bool follows(const RobotState& state) const noexcept;

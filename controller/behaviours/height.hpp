@@ -22,7 +22,8 @@ class Height {
 
   void reset() noexcept { offset_ = integral_ = 0.0; }
 
-  /// [m], over the nominal height, on the way to `wanted` for `dt` [s].
+  double offset() const noexcept { return offset_; }  ///< m, over the nominal height
+  /// The same, on the way to `wanted` for `dt` [s].
   double offset(double wanted, double dt) noexcept {
     const double step = config_.offset_rate * dt;
     return offset_ += std::clamp(wanted - offset_, -step, step);

@@ -38,6 +38,8 @@ class Stand {
   /// The reference, x and the linear model of this tick.
   void plan(const StandInput& input, TickState& out) noexcept;
   void model() noexcept;
+  /// m, where it is on its way to the wanted one.
+  double height_offset() const noexcept { return height_.offset(); }
   /// Solves; where the status is kSolved, `plan` has the forces in W and the predicted path.
   QpStatus solve(ForcePlan& plan, Trace& trace) noexcept;
 

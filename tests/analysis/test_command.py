@@ -57,7 +57,7 @@ def test_its_numbers_grow_and_go_on_growing_in_the_next_program() -> None:
 def test_a_script_is_sent_at_its_times() -> None:
     recorder = Recorder()
     assert publish(parse_script(SCRIPT, "script"), recorder, 0.8) == 5
-    assert recorder.behaviours == [WALK, WALK, LIE_DOWN, LIE_DOWN, STAND]  # nothing before 0.2 s, nor from 0.6 s on
+    assert recorder.behaviours == [WALK, WALK, LIE_DOWN, LIE_DOWN, LIE_DOWN]  # nothing before 0.2 s, nor from 0.6 s on
     assert list(recorder.published[0].velocity) == [0.5, -0.1]
 
 
@@ -74,6 +74,12 @@ def test_it_ends_with_standing_when_it_is_stopped_and_when_it_fails() -> None:
     with pytest.raises(KeyboardInterrupt):
         publish([Command(behaviour="walk")], recorder, None, interrupted)
     assert recorder.behaviours == [WALK, WALK, STAND, WALK, WALK, STAND]
+
+
+def test_a_robot_that_was_told_to_lie_down_is_not_told_to_stand_at_the_end() -> None:
+    recorder = Recorder()
+    publish([Command(behaviour="walk"), Command(PERIOD, "lie-down")], recorder, 3 * PERIOD)
+    assert recorder.behaviours == [WALK, LIE_DOWN, LIE_DOWN, LIE_DOWN]
 
 
 @pytest.mark.parametrize("behaviour", ["stand", "walk", "lie-down", "track", "catch"])

@@ -86,6 +86,7 @@ void BipedRig::give(const stance_msgs::user_command_t& command) {
   given_ = command;
   ticks_since_given_ = 0;
   static_cast<void>(ticker.offer_user_command(bytes_of(command)));
+  simulator.hear(command);
 }
 
 void BipedRig::repeat_command() {

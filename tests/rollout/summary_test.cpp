@@ -139,6 +139,7 @@ TEST_CASE("AWalkTellsItsStepsItsSegmentsAndItsTicks") {
   CHECK(json["seed"].as<int>() == 3);
   CHECK(json["times_real_time"].as<double>() == 4.0);
   CHECK_FALSE(json["fallen"].as<bool>());
+  CHECK_FALSE(json["lying"].as<bool>());
   for (const char* key : {"first_fall_s", "fall_reason", "fallen_on"}) CHECK(json[key].IsNull());
   CHECK(json["steps"].as<std::int64_t>() == summary.steps);
   CHECK(json["segments"][1]["behaviour"].as<std::string>() == "walk");
