@@ -34,7 +34,7 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
-from statistics import median
+from statistics import fmean, median
 from typing import IO, Any
 
 import yaml
@@ -99,9 +99,9 @@ class Figure:
     unit: str
     rule: str
     failed: int
-    """trials past the limit"""
+    """trials past the limit; 1 where a mean is"""
     median: float | None
-    """None where no trial gives it"""
+    """of a limit on the mean, that; None where no trial gives it"""
     worst: float | None
 
     @property
@@ -311,7 +311,7 @@ class _Trial:
 
 def _key(cell: Cell) -> str:
     """A hash of all that a trial's record depends on besides program, robot and seed."""
-    paths = sorted(_paths(cell.log_limits))
+    paths = sorted(_paths(cell.measured))
     measured = [*paths, *map(inspect.getsource, MEASURING)] if paths else []
     return hashlib.sha256(
         "\0".join([cell.name, cell.scenario, cell.configuration or "", *measured]).encode()
@@ -458,6 +458,8 @@ class _Campaign:
                     Failure(trial.seed, why, trial.rollout["drawn"], command, str(log) if log.exists() else None)
                 )
         succeeded = len(trials) - len(failures)
+        stood = [trial for trial in trials if not trial.rollout["fallen"]]
+        means = _means(cell, stood)
         return Tally(
             name=cell.name,
             trials=len(trials),
@@ -465,8 +467,8 @@ class _Campaign:
             fell=sum(bool(trial.rollout["fallen"]) for trial in trials),
             interval=wilson(succeeded, len(trials)),
             asked=_asked(cell),
-            met=_met(cell, rates),
-            figures=_figures(cell, [trial for trial in trials if not trial.rollout["fallen"]]),
+            met=False if any(mean.failed for mean in means) else _met(cell, rates),
+            figures=[*_figures(cell, stood), *means],
             failures=failures,
             pushes=_pushes(cell, trials, {failure.seed for failure in failures}),
         )
@@ -518,12 +520,12 @@ class _Campaign:
         trial = self._store.trials.get((key, seed))
         keep = trial is not None
         if trial is None:
-            told = self._rollout(cell, seed, log if cell.log_limits else None)
+            told = self._rollout(cell, seed, log if cell.measured else None)
             measured = {}
-            if cell.log_limits and not told["fallen"]:
+            if cell.measured and not told["fallen"]:
                 figures = metrics.measure(Log.open(log).run()).as_dict()
                 where = f"cell {cell.name!r}: log_limits"
-                measured = {path: figure(figures, path, where) for path in sorted(_paths(cell.log_limits))}
+                measured = {path: figure(figures, path, where) for path in sorted(_paths(cell.measured))}
             trial = _Trial(key, seed, told, measured)
             keep = bool(_why(cell, trial)) and self._is_to_keep(cell, seed)
         if keep:
@@ -664,6 +666,28 @@ def _figures(cell: Cell, stood: list[_Trial]) -> list[Figure]:
                     worst=None if worst is None else float(worst.value),
                 )
             )
+    return found
+
+
+def _means(cell: Cell, stood: list[_Trial]) -> list[Figure]:
+    """Of each limit on means: the mean over the trials that stood in place of their median."""
+    found = []
+    for limit in cell.mean_limits:
+        each = [judge(_nested(trial.log), [limit]).findings[0] for trial in stood]
+        values = [float(one.value) for one in each if one.value is not None]
+        mean = fmean(values) if values else None
+        (judged,) = judge(_nested({limit.metric: mean}), [limit]).findings
+        worst = max((one for one in each if one.value is not None), key=_badness, default=None)
+        found.append(
+            Figure(
+                name=f"mean {limit.name}",
+                unit=limit.unit,
+                rule=limit.rule,
+                failed=int(not judged.passed),
+                median=mean,
+                worst=None if worst is None else float(worst.value),
+            )
+        )
     return found
 
 

@@ -11,6 +11,8 @@
       - {name: largest tilt, metric: max_tilt_rad, unit: rad, max: 0.9}
     log_limits:                 # the same, figures of the trial's log (stance.metrics): slower
       - {name: estimated velocity, metric: estimator.velocity_rms, unit: m/s, max: 0.006}
+    mean_limits:                # figures of the logs, too, asked of the mean over a cell's trials
+      - {name: NEES, metric: estimator.nees, min: 0.4}
     cells:
       - name: $push.impulse N s
         for: {push: [{impulse: 6, rate: 0.98}, {impulse: 10, rate: 0.95}]}    # a cell for each combination of values
@@ -21,8 +23,8 @@
     twin: {name: noisy, scenario: "${scenario}_noisy", within: 0.05}    # each cell again, named ..., noisy
 
 `$name`, `$name.key` or `${name.key}` stands for a value of `for`, anywhere in a cell and in what it takes over from the
-study: alone for the value as it is, within other words for its text. A cell's `limits` and `log_limits` are added to
-the study's, its `set` and `set_robot` are merged over the study's, its `scenario` takes the place of the study's; its
+study: alone for the value as it is, within other words for its text. A cell's limits of each kind are added to the
+study's, its `set` and `set_robot` are merged over the study's, its `scenario` takes the place of the study's; its
 `trials` is its own, which the command may lower and not raise. A cell without `asked` is stated, and passes.
 
 A `twin` differs in its scenario alone, where `$scenario` stands for the cell's. Where anything is asked of the cell,
@@ -47,7 +49,7 @@ from .programs import share_directory
 
 RANDOM_VALUES = {"uniform", "choice"}  # a mapping with one of these is a value that the simulator draws
 VARIABLE = re.compile(r"\$(?:\{([A-Za-z_][\w.]*)\}|([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*))")
-OPTIONAL = ("set", "set_robot", "limits", "log_limits")
+OPTIONAL = ("set", "set_robot", "limits", "log_limits", "mean_limits")
 
 
 class _Plain(yaml.SafeDumper):
@@ -86,6 +88,13 @@ class Cell:
     """what a trial keeps to, figures of the rollout's JSON"""
     log_limits: tuple[Limit, ...] = ()
     """the same, figures of its log"""
+    mean_limits: tuple[Limit, ...] = ()
+    """what the trials that do not fall keep to in the mean, figures of their logs"""
+
+    @property
+    def measured(self) -> tuple[Limit, ...]:
+        """Those that need the log."""
+        return (*self.log_limits, *self.mean_limits)
 
     def count(self, wanted: int | None) -> int:
         """Trials to run where the command wants so many of each cell."""
@@ -205,6 +214,7 @@ def _cell(
         asked=_asked(filled(entry, "asked", {}), f"{where}: asked"),
         limits=limits("limits"),
         log_limits=limits("log_limits"),
+        mean_limits=limits("mean_limits"),
     )
     return cell, name
 

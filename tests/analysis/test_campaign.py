@@ -13,7 +13,7 @@ from typing import Any
 
 import fake_rollout
 import pytest
-from stance.campaign import Outcome, Request, as_text, run_campaign, wilson
+from stance.campaign import Outcome, Request, Tally, as_text, run_campaign, wilson
 from stance.cli import main
 from stance.errors import RunError, StanceError
 from stance.log import Log
@@ -288,6 +288,21 @@ def test_figures_of_the_log_are_judged_where_they_are_asked_for(bench: Bench) ->
     assert bench.calls() == [(10, 1, True), (30, 1, True), (80, 1, False), (80, 1, True)]
     assert [len(cell.failures) for cell in outcome.cells] == [0, 0, 1]
     assert len(list(bench.output.rglob("*.lcmlog"))) == 1  # those of trials that succeeded are gone
+
+
+def test_a_limit_on_a_mean_is_the_cells_and_fails_no_trial(bench: Bench) -> None:
+    def cell(bound: str) -> Tally:
+        limit = f"mean_limits: [{{name: height, metric: trunk.height_min, unit: m, {bound}}}]"
+        text = STUDY.replace("    for: {force: [10, 30]}", f"    for: {{force: [10, 30]}}\n    {limit}")
+        return bench.run(text, trials=2).cells[0]
+
+    mean = cell("max: 10").figures[1].median or 0.0
+    assert 0.81 < mean < 0.83
+    above, below = cell(f"min: {mean + 1e-6}"), cell(f"min: {mean - 1e-6}")
+    assert (above.succeeded, above.met, above.figures[1].failed) == (2, False, 1)
+    assert (below.succeeded, below.met, below.figures[1].failed) == (2, True, 0)
+    assert below.figures[1].name == "mean height"
+    assert (below.figures[1].worst or 0.0) <= mean
 
 
 def test_a_rollout_that_fails_is_one_line_with_the_cell_and_its_command(bench: Bench) -> None:
