@@ -2,26 +2,53 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
+#include <array>
 #include <memory>
+#include <string_view>
 
 #include "controller/behaviours/biped_controller.hpp"
 #include "controller/config/biped_config_yaml.hpp"
 
 namespace stance {
+namespace {
 
-loop::TickFunction compose(const config::RobotDescription& robot) {
-  if (robot.name == "biped") {
-    auto controller = std::make_shared<behaviours::BipedController>(config::biped_config(robot), robot.model,
-                                                                    robot.feet, robot.nominal_joint_position);
-    return [controller](const TickInput& input, StageClock& clock, TickOutput& out) {
-      controller->step(input, clock, out);
-    };
-  }
-  throw config::ConfigError("no controller for the robot '" + robot.name + "': there is one for biped");
+/// The ticks of a controller that the function keeps alive.
+template <typename Controller>
+loop::TickFunction ticks_of(std::shared_ptr<Controller> controller) {
+  return
+      [controller](const TickInput& input, StageClock& clock, TickOutput& out) { controller->step(input, clock, out); };
+}
+
+loop::Controller biped(const config::RobotDescription& robot) {
+  return {ticks_of(std::make_shared<behaviours::BipedController>(config::biped_config(robot), robot.model, robot.feet,
+                                                                 robot.nominal_joint_position)),
+          {loop::kForcePlan}};
+}
+
+struct Entry {
+  std::string_view robot;
+  loop::Controller (*compose)(const config::RobotDescription& robot);
+};
+constexpr std::array kRobots = {Entry{"biped", biped}};
+
+}  // namespace
+
+loop::Controller compose(const config::RobotDescription& robot) {
+  const auto* const found =
+      std::find_if(kRobots.begin(), kRobots.end(), [&](const Entry& entry) { return entry.robot == robot.name; });
+  if (found != kRobots.end()) return found->compose(robot);
+  std::string names;
+  for (const Entry& entry : kRobots) names += (names.empty() ? "" : ", ") + std::string(entry.robot);
+  throw config::ConfigError("no controller for the robot '" + robot.name + "': there is one for " + names);
 }
 
 std::string with_engine(const std::string& yaml_text, const std::string& engine) {
   YAML::Node root = YAML::Load(yaml_text);
+  if (!root["controller"]["force_qp"]) {
+    throw config::ConfigError("--solver is of robots with a force QP, and " +
+                              root["robot"].as<std::string>("this one") + " has none: leave it out");
+  }
   root["controller"]["force_qp"]["engine"] = engine;
   return YAML::Dump(root) + "\n";
 }

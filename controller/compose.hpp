@@ -1,5 +1,5 @@
 #pragma once
-// From a robot's description to its tick: what every program that runs a controller composes.
+// From a robot's description to its controller: what every program that runs one composes.
 #include <string>
 
 #include "controller/config/robot_description.hpp"
@@ -7,11 +7,12 @@
 
 namespace stance {
 
-/// The controller of `robot`, all memory taken. Throws config::ConfigError.
-loop::TickFunction compose(const config::RobotDescription& robot);
+/// The controller of `robot`, all memory taken. Throws config::ConfigError; of a robot that has none, it names those
+/// that have one.
+loop::Controller compose(const config::RobotDescription& robot);
 
 /// `yaml_text` with `controller.force_qp.engine` set to `engine`: what a log must carry when the command line chose
-/// another.
+/// another. Throws config::ConfigError where the robot solves no force QP.
 std::string with_engine(const std::string& yaml_text, const std::string& engine);
 
 }  // namespace stance

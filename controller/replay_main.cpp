@@ -3,9 +3,12 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdint>
+#include <functional>
 #include <iostream>
 #include <map>
 #include <optional>
+#include <string>
+#include <string_view>
 #include <vector>
 
 #include "controller/compose.hpp"
@@ -28,9 +31,9 @@ struct Recording {
   io::RunInfo info;
   bool has_info = false;
   std::map<std::int64_t, io::TraceKey> ticks;
-  std::map<std::int64_t, Payload> traces, commands, plans;  // by tick
-  Named<std::pair<std::int64_t, std::int64_t>> states;      // by run and seq
-  Named<std::int64_t> user_commands, stops;                 // by seq
+  std::map<std::string, std::map<std::int64_t, Payload>, std::less<>> published;  // by channel and tick
+  Named<std::pair<std::int64_t, std::int64_t>> states;                            // by run and seq
+  Named<std::int64_t> user_commands, stops;                                       // by seq
 };
 
 template <typename Key>
@@ -60,9 +63,9 @@ Recording read(const std::string& file) {
       io::TraceKey key;
       if (!io::decode(event.bytes, key)) continue;
       recording.ticks[key.header.seq] = key;
-      recording.traces[key.header.seq] = payload;
+      recording.published[event.channel][key.header.seq] = payload;
     } else if (const auto seq = io::tick_of(event.channel, event.bytes)) {
-      (event.channel == io::channel::kForcePlan ? recording.plans : recording.commands)[*seq] = payload;
+      recording.published[event.channel][*seq] = payload;
     }
   }
   return recording;
@@ -136,18 +139,17 @@ Outcome verify(const Recording& recording) {
     ticker.tick(tick.consumed.periods, clock);
     ++outcome.ticks;
 
-    const auto compare = [&](const std::map<std::int64_t, Payload>& recorded, const io::Message& replayed) {
-      const auto found = recorded.find(seq);
-      if (found == recorded.end()) return;
+    for (const loop::Published& replayed : ticker.published()) {
+      const auto channel = recording.published.find(std::string_view(replayed.channel));
+      if (channel == recording.published.end()) continue;
+      const auto found = channel->second.find(seq);
+      if (found == channel->second.end()) continue;
       ++outcome.messages;
-      const io::Bytes bytes = replayed.bytes();
-      if (std::equal(bytes.begin(), bytes.end(), found->second.begin(), found->second.end())) return;
+      const io::Bytes bytes = replayed.message.bytes();
+      if (std::equal(bytes.begin(), bytes.end(), found->second.begin(), found->second.end())) continue;
       ++outcome.differing;
       if (outcome.first_differing == 0) outcome.first_differing = seq;
-    };
-    compare(recording.plans, ticker.plan());
-    compare(recording.commands, ticker.command());
-    compare(recording.traces, ticker.trace());
+    }
   }
   return outcome;
 }
@@ -156,7 +158,7 @@ Outcome verify(const Recording& recording) {
 
 int main(int argc, char** argv) {
   CLI::App app{
-      "Replays a log through the controller and compares every joint command, force plan and trace, byte for byte."};
+      "Replays a log through the controller and compares all that it published but its timing, byte for byte."};
   app.set_version_flag("--version", STANCE_VERSION);
   std::string file;
   app.add_option("LOG", file, "An LCM log of stance-controller's run")->required()->check(CLI::ExistingFile);

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iostream>
 #include <optional>
+#include <string_view>
 #include <vector>
 
 #include "controller/compose.hpp"
@@ -90,10 +91,12 @@ int main(int argc, char** argv) {
       static_cast<void>(ticker.offer_state(state));
       ticker.tick(1, clock);
       clock.finish();
-      record(io::channel::kForcePlan, ticker.plan().bytes());
-      record(io::channel::kJointCommand, ticker.command().bytes());
-      record(io::channel::kTrace, ticker.trace().bytes());
-      simulator.accept(io::decoded<stance_msgs::force_plan_t>(ticker.plan().bytes()));
+      for (const auto& [channel, message] : ticker.published()) {
+        record(channel, message.bytes());
+        if (channel == std::string_view(io::channel::kForcePlan)) {
+          simulator.accept(io::decoded<stance_msgs::force_plan_t>(message.bytes()));
+        }
+      }
       simulator.accept(io::decoded<stance_msgs::joint_command_t>(ticker.command().bytes()));
       simulator.advance();
       observer.period(ticker, clock.timing().cpu_us);

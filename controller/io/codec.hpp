@@ -72,7 +72,8 @@ struct TraceKey {
   Consumed consumed;
 };
 [[nodiscard]] bool decode(Bytes bytes, TraceKey& out) noexcept;
-/// The tick that a JOINT_COMMAND or FORCE_PLAN is of; nothing for another channel or broken bytes.
+/// The tick that a message of one of the controller's channels is of, but for the trace; nothing for another channel or
+/// broken bytes.
 std::optional<std::int64_t> tick_of(std::string_view channel, Bytes bytes) noexcept;
 
 /// Room for the largest message that the controller publishes.

@@ -94,9 +94,7 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
     clock.start();
     timing.state_age_us = static_cast<double>(timing.start_utime) - static_cast<double>(ticker.state().utime);
     ticker.tick(periods, clock);
-    transport.publish(io::channel::kForcePlan, ticker.plan().bytes());
-    transport.publish(io::channel::kJointCommand, ticker.command().bytes());
-    transport.publish(io::channel::kTrace, ticker.trace().bytes());
+    for (const Published& out : ticker.published()) transport.publish(out.channel, out.message.bytes());
     clock.finish();
 
     if (ticker.state().run_id != run_id) {

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "controller/platform/hash.hpp"
 
@@ -22,6 +23,12 @@ std::uint64_t consumed_hash(std::uint64_t state, std::uint64_t user_command, std
   std::uint64_t hash = platform::kHashSeed;
   for (const std::uint64_t part : {state, user_command, stop}) hash = platform::hash_step(hash, part);
   return hash;
+}
+
+Ticker::Ticker(Controller controller) : controller_(std::move(controller)) {
+  for (const Publication& publication : controller_.publications) published_.push_back({publication.channel, {}});
+  published_.push_back({io::channel::kJointCommand, {}});
+  published_.push_back({io::channel::kTrace, {}});
 }
 
 bool Ticker::offer_state(io::Bytes bytes) noexcept {
@@ -67,7 +74,7 @@ void Ticker::tick(int periods, StageClock& clock) noexcept {
   input_.state_is_new = consumed_.state_is_new;
   input_.periods = periods;
   clock.stamp(Stage::kDecode);
-  tick_(input_, clock, output_);
+  controller_.tick(input_, clock, output_);
 
   // A stamp is whatever came: unsigned, so that it may wrap.
   header_.utime = static_cast<std::int64_t>(static_cast<std::uint64_t>(input_.state.utime) +
@@ -75,9 +82,12 @@ void Ticker::tick(int periods, StageClock& clock) noexcept {
   header_.seq += 1;
   header_.state_seq = input_.state.seq;
   header_.run_id = input_.state.run_id;
-  io::encode(header_, output_.plan, plan_);
-  io::encode(header_, output_.command, command_);
-  io::encode(header_, consumed_, output_.trace, trace_);
+  const std::size_t own = controller_.publications.size();
+  for (std::size_t i = 0; i < own; ++i) {
+    controller_.publications[i].encode(header_, output_, published_[i].message);
+  }
+  io::encode(header_, output_.command, published_[own].message);
+  io::encode(header_, consumed_, output_.trace, published_[own + 1].message);
   consumed_.state_is_new = false;
   state_hash_ = user_command_hash_ = stop_hash_ = 0;
   clock.stamp(Stage::kEncode);

@@ -2,6 +2,8 @@
 // One tick of any robot, from the newest messages' bytes to the bytes to publish. The real-time loop, the lockstep
 // loop, the rollout and the replay all run this, so that the same inputs give the same bits.
 #include <functional>
+#include <span>
+#include <vector>
 
 #include "controller/io/codec.hpp"
 
@@ -9,6 +11,32 @@ namespace stance::loop {
 
 /// A robot's tick. Must not throw.
 using TickFunction = std::function<void(const TickInput&, StageClock&, TickOutput&)>;
+
+/// A message that a robot's ticks publish besides the joint command and the trace, which every robot's do.
+struct Publication {
+  const char* channel;
+  void (*encode)(const io::Header& header, const TickOutput& output, io::Message& out) noexcept;
+};
+/// Of one part of the tick's output, as in publication<&TickOutput::plan>(channel::kForcePlan).
+template <auto part>
+constexpr Publication publication(const char* channel) noexcept {
+  return {channel, [](const io::Header& header, const TickOutput& output, io::Message& out) noexcept {
+            io::encode(header, output.*part, out);
+          }};
+}
+inline constexpr Publication kForcePlan = publication<&TickOutput::plan>(io::channel::kForcePlan);
+
+/// What a loop needs of a robot's controller.
+struct Controller {
+  TickFunction tick;
+  std::vector<Publication> publications;
+};
+
+/// What a tick published, and where.
+struct Published {
+  const char* channel;
+  io::Message message;
+};
 
 /// Control periods from one state's stamp to the next one's, at least 1.
 int periods_between(std::int64_t utime, std::int64_t next_utime) noexcept;
@@ -18,7 +46,7 @@ std::uint64_t consumed_hash(std::uint64_t state, std::uint64_t user_command, std
 
 class Ticker {
  public:
-  explicit Ticker(TickFunction tick) : tick_(std::move(tick)) {}
+  explicit Ticker(Controller controller);
 
   /// The newest message of a kind, for the next tick. False where the bytes are not a message of that type.
   [[nodiscard]] bool offer_state(io::Bytes bytes) noexcept;
@@ -34,15 +62,17 @@ class Ticker {
 
   const io::Header& header() const noexcept { return header_; }
   const TickOutput& output() const noexcept { return output_; }
-  const io::Message& plan() const noexcept { return plan_; }
-  const io::Message& command() const noexcept { return command_; }
-  const io::Message& trace() const noexcept { return trace_; }
+  /// All that the last tick published, in the order in which it goes out: the robot's own messages, its command, its
+  /// trace.
+  std::span<const Published> published() const noexcept { return published_; }
+  const io::Message& command() const noexcept { return published_[published_.size() - 2].message; }
+  const io::Message& trace() const noexcept { return published_.back().message; }
 
  private:
   /// What earlier ticks consumed ends with their run; what came since may be the new run's, and stays.
   void end_run() noexcept;
 
-  TickFunction tick_;
+  Controller controller_;
   TickInput input_;
   TickOutput output_;
   io::Header header_;
@@ -50,7 +80,7 @@ class Ticker {
   // Of the newest bytes of each kind since the last tick, 0 for none.
   std::uint64_t state_hash_ = 0, user_command_hash_ = 0, stop_hash_ = 0;
   std::int64_t late_periods_ = 0;  ///< since the state in use
-  io::Message plan_, command_, trace_;
+  std::vector<Published> published_;
 };
 
 }  // namespace stance::loop

@@ -259,7 +259,12 @@ TEST_CASE("WithEngineChangesTheEngineAndNothingElse") {
 
 TEST_CASE("ARobotWithoutAControllerIsRefusedByName") {
   CHECK_THROWS_MATCHES(compose(test::biped_with("robot", "centipede")), ConfigError,
-                       MessageMatches(ContainsSubstring("centipede")));
+                       MessageMatches(ContainsSubstring("centipede") && ContainsSubstring("there is one for biped")));
+}
+
+TEST_CASE("AnEngineForARobotWithoutAForceQpIsRefused") {
+  CHECK_THROWS_MATCHES(with_engine("{robot: arm, controller: {gain: 1}}", "structured"), ConfigError,
+                       MessageMatches(ContainsSubstring("--solver") && ContainsSubstring("arm has none")));
 }
 
 TEST_CASE("TheBipedFromItsTextsIsTheBiped") {

@@ -46,7 +46,7 @@ sim::ScheduledPush push(double time, double x, double y, double z) {
 }
 
 Answer answer_of(const loop::Ticker& ticker) {
-  return {bytes_of(ticker.plan()), bytes_of(ticker.command()), bytes_of(ticker.trace())};
+  return {bytes_of(ticker.published().front().message), bytes_of(ticker.command()), bytes_of(ticker.trace())};
 }
 
 BipedRig::BipedRig(const sim::Scenario& scenario, const config::RobotDescription& description, std::int64_t run_id)
@@ -62,7 +62,7 @@ double BipedRig::tilt() const {
 void BipedRig::answer() {
   loop::NoClock clock;
   ticker.tick(1, clock);
-  simulator.accept(decoded<stance_msgs::force_plan_t>(ticker.plan().bytes()));
+  simulator.accept(decoded<stance_msgs::force_plan_t>(ticker.published().front().message.bytes()));
   simulator.accept(decoded<stance_msgs::joint_command_t>(ticker.command().bytes()));
   simulator.advance();
 }

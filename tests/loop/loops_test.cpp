@@ -60,7 +60,7 @@ class Watchdog {
 
 /// A controller on memory's LCM, and all that it published.
 struct Bench {
-  explicit Bench(TickFunction tick = compose(test::biped())) : ticker(std::move(tick)) {
+  explicit Bench(Controller controller = compose(test::biped())) : ticker(std::move(controller)) {
     for (const char* name : {io::channel::kForcePlan, io::channel::kJointCommand, io::channel::kTrace,
                              io::channel::kTiming, io::channel::kRunInfo}) {
       transport.subscribe(name, [this, name](io::Bytes bytes) {
@@ -302,12 +302,14 @@ TEST_CASE("InRealTimeTimingsAddUpAndCountEveryMissedDeadline") {
   static constexpr auto slowness = 7 * kPeriod / 2;  // three deadlines
   const std::vector<ByteVector> states = test::recorded_states(test::quiet_stand(), num_ticks + 1, kRun);
   std::atomic<bool>* stop = nullptr;
-  Bench bench([biped = compose(test::biped()), &stop, ticks = 0](const TickInput& input, StageClock& clock,
-                                                                 TickOutput& output) mutable {
-    biped(input, clock, output);
+  Controller biped = compose(test::biped());
+  biped.tick = [tick = biped.tick, &stop, ticks = 0](const TickInput& input, StageClock& clock,
+                                                     TickOutput& output) mutable {
+    tick(input, clock, output);
     if (++ticks == slow_tick) std::this_thread::sleep_for(slowness);
     if (ticks == num_ticks) *stop = true;
-  });
+  };
+  Bench bench(biped);
   stop = &bench.stop;
   const Watchdog watchdog(bench.stop);
   std::size_t next = 0;

@@ -58,7 +58,8 @@ struct Bench {
 
   std::vector<TickInput> inputs;
   NoClock clock;
-  Ticker ticker{[this](const TickInput& input, StageClock&, TickOutput&) { inputs.push_back(input); }};
+  Ticker ticker{
+      Controller{[this](const TickInput& input, StageClock&, TickOutput&) { inputs.push_back(input); }, {kForcePlan}}};
   controller_trace_t trace{};
 };
 
@@ -97,7 +98,7 @@ TEST_CASE_METHOD(Bench, "EveryMessageNamesItsTickItsStateAndItsRun") {
     CHECK(message.utime == 420'000);
   };
   check(decoded<stance_msgs::joint_command_t>(ticker.command().bytes()));
-  check(decoded<stance_msgs::force_plan_t>(ticker.plan().bytes()));
+  check(decoded<stance_msgs::force_plan_t>(ticker.published().front().message.bytes()));
   check(trace);
   check(ticker.header());
   CHECK(trace.state_is_new == 1);

@@ -6,7 +6,7 @@
 int main() {
   const auto qp = stance::force_qp::make_force_qp({}, {1, 2}, 130.0);
   const auto robot = stance::config::load_robot(stance::config::share_directory() / "robots", "biped");
-  const auto tick = stance::compose(robot);
+  const auto controller = stance::compose(robot);
   std::printf("%.6f\n", robot.model.total_mass);
-  return qp && tick ? 0 : 1;
+  return qp && controller.tick ? 0 : 1;
 }
