@@ -46,7 +46,7 @@ int main(int argc, char** argv) {
   try {
     auto robot = config::load_robot(config::share_directory() / "robots", robot_name);
     if (!engine.empty()) robot.yaml_text = with_engine(robot.yaml_text, engine);
-    const sim::Scenario scenario = sim::load_scenario(robot_name, scenario_name, seed);
+    const sim::Scenario scenario = sim::load_scenario(robot, scenario_name, seed);
     sim::SimulatorOptions options;
     options.seed = seed;
     options.run_id = run_id;

@@ -35,8 +35,11 @@ void lift_feet(const config::RobotDescription& robot, const std::vector<double>&
 rigid_body::State initial_state(const config::RobotDescription& robot, const InitialState& initial,
                                 const Terrain& terrain) {
   rigid_body::State state;
+  if (!robot.has_feet()) {
+    state.q = initial.joint_position;
+    return state;
+  }
   state.q = robot.nominal_joint_position;
-  if (robot.feet.empty()) return state;
   state.R_WB = math::rotation_from_rpy(initial.roll_pitch_yaw);
   state.v_WB = initial.velocity_W;
   state.w_WB_W = initial.angular_velocity_W;

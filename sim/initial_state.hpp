@@ -9,7 +9,8 @@ namespace stance::sim {
 
 /// The nominal pose, W's origin amid the feet, the lowest foot at its clearance over the ground. Where the ground is
 /// not as high under one foot as under the other, each leg reaches for its own, the last link's pitch kept. A robot
-/// without feet begins at W's origin. Throws std::invalid_argument where a leg cannot reach.
+/// without feet begins with its joints where `initial` has them, its base in W's origin. Throws std::invalid_argument
+/// where a leg cannot reach.
 rigid_body::State initial_state(const config::RobotDescription& robot, const InitialState& initial,
                                 const Terrain& terrain);
 

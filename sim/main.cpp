@@ -15,11 +15,12 @@ namespace {
 
 void print_summary(const stance::sim::Simulator& simulator, const stance::sim::NodeReport& report, bool real_time) {
   const auto& refused = simulator.refused();
-  std::fprintf(stderr, "stance-sim: %.2f s simulated; the robot %s; %lld commands refused", simulator.time(),
-               simulator.fallen()  ? "fell"
-               : simulator.lying() ? "lay down"
-                                   : "did not fall",
-               static_cast<long long>(refused.total()));
+  std::fprintf(stderr, "stance-sim: %.2f s simulated; ", simulator.time());
+  if (simulator.truth().num_contacts > 0) {
+    const char* fate = simulator.fallen() ? "fell" : simulator.lying() ? "lay down" : "did not fall";
+    std::fprintf(stderr, "the robot %s; ", fate);
+  }
+  std::fprintf(stderr, "%lld commands refused", static_cast<long long>(refused.total()));
   if (refused.total() > 0) {
     std::fprintf(stderr, " (stale %lld, not finite %lld, order %lld, run %lld)", static_cast<long long>(refused.stale),
                  static_cast<long long>(refused.not_finite), static_cast<long long>(refused.order),
@@ -72,7 +73,7 @@ int main(int argc, char** argv) {
 
   try {
     const auto robot = config::load_robot(config::share_directory() / "robots", robot_name);
-    const sim::Scenario scenario = sim::load_scenario(robot_name, scenario_name, options.seed);
+    const sim::Scenario scenario = sim::load_scenario(robot, scenario_name, options.seed);
     if (!plant_name.empty()) options.plant = sim::plant_from_name(plant_name);
     const auto periods =
         static_cast<std::int64_t>(std::llround((duration > 0.0 ? duration : scenario.duration) / kControlPeriod));

@@ -4,9 +4,9 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <initializer_list>
 #include <string_view>
 
-#include "controller/config/robot_description.hpp"
 #include "controller/platform/text.hpp"
 #include "sim/world.hpp"
 
@@ -51,14 +51,45 @@ bool is_word(StrictYaml& yaml, const std::string& key, const std::string& word) 
   return true;
 }
 
-SensorNoise noise_from(StrictYaml yaml) {
+/// Tells the keys of robots with feet from those of robots on a fixed base: what a robot's kind has not is refused by
+/// name, so that nothing in a scenario goes unheard.
+class Kind {
+ public:
+  explicit Kind(const config::RobotDescription& robot) : has_feet_(robot.has_feet()), robot_(robot.name) {}
+
+  /// Are `keys`, which only robots with feet have, to be read?
+  bool with_feet(const StrictYaml& yaml, std::initializer_list<const char*> keys) const {
+    return ask(yaml, keys, has_feet_, "is of robots with feet, and " + robot_ + " has none: remove it");
+  }
+  /// The same of keys which only robots without feet have.
+  bool without_feet(const StrictYaml& yaml, std::initializer_list<const char*> keys) const {
+    return ask(yaml, keys, !has_feet_, "is of robots without feet, and " + robot_ + " has some: remove it");
+  }
+
+ private:
+  static bool ask(const StrictYaml& yaml, std::initializer_list<const char*> keys, bool ours,
+                  const std::string& refusal) {
+    for (const char* key : keys) {
+      if (!ours && yaml.has(key)) yaml.fail(key, refusal);
+    }
+    return ours;
+  }
+
+  bool has_feet_;
+  std::string robot_;
+};
+
+SensorNoise noise_from(StrictYaml yaml, const Kind& kind) {
   constexpr double most = 10.0;  // of any of them: a bound that only an error of units passes
   SensorNoise noise;
-  noise.gyro_white = number_in(yaml, "gyro_white", 0.0, most);
-  noise.gyro_bias = number_in(yaml, "gyro_bias", 0.0, most);
-  noise.gyro_bias_walk = number_in(yaml, "gyro_bias_walk", 0.0, most);
-  noise.accelerometer_white = number_in(yaml, "accelerometer_white", 0.0, most);
-  noise.accelerometer_bias = number_in(yaml, "accelerometer_bias", 0.0, most);
+  if (kind.with_feet(yaml,
+                     {"gyro_white", "gyro_bias", "gyro_bias_walk", "accelerometer_white", "accelerometer_bias"})) {
+    noise.gyro_white = number_in(yaml, "gyro_white", 0.0, most);
+    noise.gyro_bias = number_in(yaml, "gyro_bias", 0.0, most);
+    noise.gyro_bias_walk = number_in(yaml, "gyro_bias_walk", 0.0, most);
+    noise.accelerometer_white = number_in(yaml, "accelerometer_white", 0.0, most);
+    noise.accelerometer_bias = number_in(yaml, "accelerometer_bias", 0.0, most);
+  }
   noise.joint_position_resolution = number_in(yaml, "joint_position_resolution", 0.0, most);
   noise.joint_position_offset = number_in(yaml, "joint_position_offset", 0.0, most);
   noise.joint_velocity_white = number_in(yaml, "joint_velocity_white", 0.0, most);
@@ -66,23 +97,39 @@ SensorNoise noise_from(StrictYaml yaml) {
   return noise;
 }
 
-SensorModel sensors_from(StrictYaml yaml) {
+SensorModel sensors_from(StrictYaml yaml, const Kind& kind) {
   SensorModel sensors;
   sensors.delay_steps = whole_steps(yaml, "delay", kPhysicsStep, kMaxSensorDelaySteps);
-  sensors.accelerometer_limit = number_in(yaml, "accelerometer_limit", kGravity, 1e6);
-  sensors.contact_threshold = number_in(yaml, "contact_threshold", 0.0, 1e6);
-  sensors.contact_delay_steps = whole_steps(yaml, "contact_delay", kPhysicsStep, kMaxSensorDelaySteps);
-  if (!is_word(yaml, "noise", "none")) sensors.noise = noise_from(yaml.mapping("noise"));
+  if (kind.with_feet(yaml, {"accelerometer_limit", "contact_threshold", "contact_delay"})) {
+    sensors.accelerometer_limit = number_in(yaml, "accelerometer_limit", kGravity, 1e6);
+    sensors.contact_threshold = number_in(yaml, "contact_threshold", 0.0, 1e6);
+    sensors.contact_delay_steps = whole_steps(yaml, "contact_delay", kPhysicsStep, kMaxSensorDelaySteps);
+  }
+  if (!is_word(yaml, "noise", "none")) sensors.noise = noise_from(yaml.mapping("noise"), kind);
   yaml.finish();
   return sensors;
 }
 
-InitialState initial_from(StrictYaml yaml) {
+InitialState initial_from(StrictYaml yaml, const Kind& kind, const rigid_body::Model& model) {
   InitialState initial;
-  initial.foot_clearance = number_in(yaml, "foot_clearance", -0.005, 10.0);
-  initial.roll_pitch_yaw = vector(yaml, "roll_pitch_yaw");
-  initial.velocity_W = vector(yaml, "velocity_W");
-  initial.angular_velocity_W = vector(yaml, "angular_velocity_W");
+  if (kind.with_feet(yaml, {"foot_clearance", "roll_pitch_yaw", "velocity_W", "angular_velocity_W"})) {
+    initial.foot_clearance = number_in(yaml, "foot_clearance", -0.005, 10.0);
+    initial.roll_pitch_yaw = vector(yaml, "roll_pitch_yaw");
+    initial.velocity_W = vector(yaml, "velocity_W");
+    initial.angular_velocity_W = vector(yaml, "angular_velocity_W");
+  }
+  if (kind.without_feet(yaml, {"joint_position"})) {
+    const std::vector<double> position = yaml.numbers("joint_position", model.num_joints);
+    for (std::size_t i = 0; i < position.size(); ++i) {
+      const auto& joint = model.joints[i];
+      if (position[i] < joint.lower || position[i] > joint.upper) {
+        yaml.fail("joint_position", "puts joint " + joint.name + " at " + to_text(position[i]) +
+                                        " rad, but must be in [" + to_text(joint.lower) + ", " + to_text(joint.upper) +
+                                        "]");
+      }
+      initial.joint_position[static_cast<Eigen::Index>(i)] = position[i];
+    }
+  }
   yaml.finish();
   return initial;
 }
@@ -124,7 +171,7 @@ ScheduledPush push_from(StrictYaml yaml) {
   return push;
 }
 
-ScheduledCommand command_from(StrictYaml yaml) {
+ScheduledCommand command_from(StrictYaml yaml, const Kind& kind) {
   ScheduledCommand command;
   command.period = whole_steps(yaml, "time", kControlPeriod, 100'000'000);
   const std::string name = yaml.text("behaviour");
@@ -138,10 +185,12 @@ ScheduledCommand command_from(StrictYaml yaml) {
     yaml.fail("behaviour", "is '" + name + "', but must be stand, walk, lie-down, track, catch or silent");
   }
   command.behaviour = static_cast<Behaviour>(known - kBehaviourNames.begin());
-  const std::vector<double> velocity = yaml.numbers("velocity", 2);
-  command.velocity = {velocity[0], velocity[1]};
-  command.yaw_rate = yaml.number("yaw_rate");
-  command.height_offset = yaml.number("height_offset");
+  if (kind.with_feet(yaml, {"velocity", "yaw_rate", "height_offset"})) {
+    const std::vector<double> velocity = yaml.numbers("velocity", 2);
+    command.velocity = {velocity[0], velocity[1]};
+    command.yaw_rate = yaml.number("yaw_rate");
+    command.height_offset = yaml.number("height_offset");
+  }
   yaml.finish();
   return command;
 }
@@ -158,28 +207,38 @@ std::optional<Plant> plant_from_name(const std::string& name) {
   return std::nullopt;
 }
 
-Scenario scenario_from_text(const std::string& text, const std::string& name, std::uint64_t seed) {
+Scenario scenario_from_text(const std::string& text, const std::string& name, const config::RobotDescription& robot,
+                            std::uint64_t seed) {
+  const Kind kind(robot);
   const DrawnText drawn = draw_random_values(text, name, seed);
   StrictYaml yaml = StrictYaml::parse(drawn.text, name);
   Scenario scenario;
   scenario.text = drawn.text;
   scenario.drawn = drawn.values;
   scenario.robot = yaml.text("robot");
-  const std::string plant = yaml.text("plant");
-  if (!plant_from_name(plant)) yaml.fail("plant", "is '" + plant + "', but must be multibody or single-body");
-  scenario.plant = *plant_from_name(plant);
+  if (scenario.robot != robot.name) {
+    throw config::ConfigError(name + ": robot is '" + scenario.robot + "', but the run is of '" + robot.name + "'");
+  }
   scenario.duration = number_in(yaml, "duration", kControlPeriod, 1e6);
-  scenario.friction = number_in(yaml, "friction", 0.0, 10.0);
-  if (!is_word(yaml, "terrain", "flat")) scenario.terrain = terrain_from(yaml.mapping("terrain"));
   scenario.command_delay_steps = whole_steps(yaml, "command_latency", kPhysicsStep, kMaxCommandDelaySteps);
   StrictYaml factors = yaml.mapping("mass_factor");
-  scenario.trunk_mass_factor = number_in(factors, "trunk", 0.1, 10.0);
-  scenario.leg_mass_factor = number_in(factors, "legs", 0.1, 10.0);
+  if (kind.with_feet(yaml, {"plant", "friction", "terrain", "pushes"})) {
+    const std::string plant = yaml.text("plant");
+    if (!plant_from_name(plant)) yaml.fail("plant", "is '" + plant + "', but must be multibody or single-body");
+    scenario.plant = *plant_from_name(plant);
+    scenario.friction = number_in(yaml, "friction", 0.0, 10.0);
+    if (!is_word(yaml, "terrain", "flat")) scenario.terrain = terrain_from(yaml.mapping("terrain"));
+    for (StrictYaml& push : yaml.mappings("pushes")) scenario.pushes.push_back(push_from(push));
+  }
+  if (kind.with_feet(factors, {"trunk", "legs"})) {
+    scenario.trunk_mass_factor = number_in(factors, "trunk", 0.1, 10.0);
+    scenario.limb_mass_factor = number_in(factors, "legs", 0.1, 10.0);
+  }
+  if (kind.without_feet(factors, {"links"})) scenario.limb_mass_factor = number_in(factors, "links", 0.1, 10.0);
   factors.finish();
-  scenario.initial = initial_from(yaml.mapping("initial_state"));
-  scenario.sensors = sensors_from(yaml.mapping("sensors"));
-  for (StrictYaml& push : yaml.mappings("pushes")) scenario.pushes.push_back(push_from(push));
-  for (StrictYaml& command : yaml.mappings("commands")) scenario.commands.push_back(command_from(command));
+  scenario.initial = initial_from(yaml.mapping("initial_state"), kind, robot.model);
+  scenario.sensors = sensors_from(yaml.mapping("sensors"), kind);
+  for (StrictYaml& command : yaml.mappings("commands")) scenario.commands.push_back(command_from(command, kind));
   yaml.finish();
 
   const auto earlier = [](const auto& a, const auto& b) { return a.time < b.time; };
@@ -193,21 +252,16 @@ Scenario scenario_from_text(const std::string& text, const std::string& name, st
   return scenario;
 }
 
-Scenario load_scenario(const std::string& robot, const std::string& scenario, std::uint64_t seed) {
+Scenario load_scenario(const config::RobotDescription& robot, const std::string& scenario, std::uint64_t seed) {
   std::filesystem::path file = scenario;
   if (file.extension() != ".yaml") {
-    file = config::share_directory() / "sim" / "scenarios" / robot / (scenario + ".yaml");
+    file = config::share_directory() / "sim" / "scenarios" / robot.name / (scenario + ".yaml");
     if (!std::filesystem::exists(file)) {
-      throw config::ConfigError("no scenario '" + scenario + "' of robot " + robot + ": " + file.string() +
+      throw config::ConfigError("no scenario '" + scenario + "' of robot " + robot.name + ": " + file.string() +
                                 " does not exist");
     }
   }
-  Scenario loaded = scenario_from_text(config::read_text(file), file.filename().string(), seed);
-  if (loaded.robot != robot) {
-    throw config::ConfigError(file.filename().string() + ": robot is '" + loaded.robot + "', but the run is of '" +
-                              robot + "'");
-  }
-  return loaded;
+  return scenario_from_text(config::read_text(file), file.filename().string(), robot, seed);
 }
 
 }  // namespace stance::sim

@@ -3,12 +3,13 @@
 // is judged by are not here.
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "controller/config/strict_yaml.hpp"
+#include "controller/config/robot_description.hpp"
 #include "controller/interface/signals.hpp"
 #include "sim/random_values.hpp"
 #include "sim/terrain.hpp"
@@ -34,15 +35,17 @@ struct SensorNoise {
 };
 
 struct SensorModel {
-  int delay_steps = 0;               ///< physics steps, of the IMU and the encoders alike
-  double accelerometer_limit = 0.0;  ///< m/s^2, saturation of each axis
-  double contact_threshold = 0.0;    ///< N, normal force that closes a switch
-  int contact_delay_steps = 0;       ///< physics steps
+  int delay_steps = 0;  ///< physics steps, of the IMU and the encoders alike
+  double accelerometer_limit = std::numeric_limits<double>::infinity();  ///< m/s^2, saturation of each axis
+  double contact_threshold = 0.0;                                        ///< N, normal force that closes a switch
+  int contact_delay_steps = 0;                                           ///< physics steps
   SensorNoise noise;
 };
 
+/// Of a robot with feet, its nominal posture somewhere; of one without, its joints' positions.
 struct InitialState {
-  double foot_clearance = 0.0;  ///< m, of the lowest foot over the ground; negative in contact
+  JointVector joint_position = JointVector::Zero();  ///< rad
+  double foot_clearance = 0.0;                       ///< m, of the lowest foot over the ground; negative in contact
   Vector3 roll_pitch_yaw = Vector3::Zero();
   Vector3 velocity_W = Vector3::Zero();          ///< m/s, of the base
   Vector3 angular_velocity_W = Vector3::Zero();  ///< rad/s, of the base
@@ -77,7 +80,7 @@ struct Scenario {
   TerrainModel terrain;
   int command_delay_steps = 0;     ///< physics steps from a state to the effect of the command that answers it
   double trunk_mass_factor = 1.0;  ///< the plant's mass and inertia over the URDF's
-  double leg_mass_factor = 1.0;
+  double limb_mass_factor = 1.0;   ///< the same of all that is not the base: legs, or an arm's links
   InitialState initial;
   SensorModel sensors;
   std::vector<ScheduledPush> pushes;       ///< in order of time
@@ -88,11 +91,14 @@ inline constexpr int kUserCommandPeriods = 10;  ///< control periods between two
 inline constexpr int kMaxCommandDelaySteps = 50;
 inline constexpr int kMaxSensorDelaySteps = 20;
 
-/// `seed` draws the random values. Throws config::ConfigError naming `name`, the key, its value and what is allowed.
-Scenario scenario_from_text(const std::string& text, const std::string& name, std::uint64_t seed);
+/// A scenario of `robot`; `seed` draws the random values. What only robots with feet have is asked of them and refused
+/// of others, and the other way round. Throws config::ConfigError naming `name`, the key, its value and what is
+/// allowed.
+Scenario scenario_from_text(const std::string& text, const std::string& name, const config::RobotDescription& robot,
+                            std::uint64_t seed);
 
 /// `scenario` is a name below sim/scenarios/<robot>/ of the share directory, or a path that ends in .yaml. Throws
 /// likewise.
-Scenario load_scenario(const std::string& robot, const std::string& scenario, std::uint64_t seed);
+Scenario load_scenario(const config::RobotDescription& robot, const std::string& scenario, std::uint64_t seed);
 
 }  // namespace stance::sim

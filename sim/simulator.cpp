@@ -28,11 +28,11 @@ void copy(const Vector3& from, double (&to)[3]) noexcept {
 
 Vector3 vector(const double (&v)[3]) noexcept { return {v[0], v[1], v[2]}; }
 
-rigid_body::Model with_mass_factors(rigid_body::Model model, double trunk, double legs) {
+rigid_body::Model with_mass_factors(rigid_body::Model model, double base, double limbs) {
   model.total_mass = 0.0;
   for (int i = 0; i < model.num_bodies(); ++i) {
     auto& body = model.bodies[static_cast<std::size_t>(i)];
-    const double factor = i == 0 ? trunk : legs;
+    const double factor = i == 0 ? base : limbs;
     body.mass *= factor;
     body.inertia *= factor;
     model.total_mass += body.mass;
@@ -78,7 +78,7 @@ Simulator::Simulator(const config::RobotDescription& robot, const Scenario& scen
       num_contacts_(robot.feet.size()),
       timeout_steps_(std::lround(robot.drives.command_timeout / kPhysicsStep)),
       gate_(options.run_id, robot.model.num_joints, timeout_steps_ / kStepsPerPeriod) {
-  robot_.model = with_mass_factors(robot_.model, scenario_.trunk_mass_factor, scenario_.leg_mass_factor);
+  robot_.model = with_mass_factors(robot_.model, scenario_.trunk_mass_factor, scenario_.limb_mass_factor);
   WorldSetup setup;
   setup.model = robot_.model;
   setup.feet = robot_.feet;
@@ -90,6 +90,10 @@ Simulator::Simulator(const config::RobotDescription& robot, const Scenario& scen
   if (options_.plant.value_or(scenario_.plant) == Plant::kMultibody) {
     world_.emplace(setup);
   } else {
+    if (num_contacts_ == 0) {
+      throw std::invalid_argument("the single body stands on feet, and " + robot.name +
+                                  " has none: leave the plant out");
+    }
     if (!scenario_.terrain.is_flat()) {
       throw std::invalid_argument("the single body stands on flat ground: give the scenario's terrain as flat");
     }

@@ -72,7 +72,11 @@ RobotDescription robot_from_texts(const std::string& yaml_text, const std::strin
   const auto nominal = yaml.numbers("nominal_joint_position", num_joints);
   for (int i = 0; i < num_joints; ++i) robot.nominal_joint_position[i] = nominal[static_cast<std::size_t>(i)];
   robot.drives = drives(yaml.mapping("drives"), num_joints);
-  if (!robot.foot_links.empty()) robot.fallen = fall_limits(yaml.mapping("fallen"));
+  if (robot.has_feet()) {
+    robot.fallen = fall_limits(yaml.mapping("fallen"));
+  } else if (yaml.has("fallen")) {
+    yaml.fail("fallen", "is of a robot with feet: remove it, or name them in feet");
+  }
   yaml.leave("controller");
   yaml.finish();
   try {

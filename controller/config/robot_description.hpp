@@ -21,12 +21,14 @@ struct RobotDescription {
   std::string urdf_text;
   std::string yaml_text;
   std::vector<std::string> joint_names;  ///< the order of every joint vector
-  std::vector<std::string> foot_links;   ///< left first
+  std::vector<std::string> foot_links;   ///< left first; none where the base is fixed, in W's origin and turned as W is
   rigid_body::Model model;
   std::vector<rigid_body::Foot> feet;
   JointVector nominal_joint_position = JointVector::Zero();  ///< rad
   DriveDescription drives;
   kinematics::FallLimits fallen;  ///< of a robot with feet
+
+  bool has_feet() const { return !foot_links.empty(); }
 };
 
 /// Whole text of a file. Throws ConfigError naming it where it cannot be read.

@@ -35,7 +35,7 @@ config::RobotDescription biped_with(const std::string& path, const std::string& 
 }
 
 sim::Scenario quiet_stand() {
-  sim::Scenario scenario = sim::load_scenario("biped", "stand", 1);
+  sim::Scenario scenario = sim::load_scenario(biped(), "stand", 1);
   scenario.sensors.noise = {};
   scenario.pushes.clear();
   return scenario;

@@ -19,7 +19,7 @@ WorldSetup biped_world(double height) {
   return setup;
 }
 
-Scenario biped_scenario(const std::string& name) { return load_scenario("biped", name, 1); }
+Scenario biped_scenario(const std::string& name) { return load_scenario(biped(), name, 1); }
 
 stance_msgs::joint_command_t hold_command(const config::RobotDescription& robot, const Simulator& simulator) {
   stance_msgs::joint_command_t command{};

@@ -10,6 +10,7 @@
 #include "sim/random.hpp"
 #include "sim/random_values.hpp"
 #include "sim/scenario.hpp"
+#include "tests/sim/robots.hpp"
 
 namespace stance::sim {
 namespace {
@@ -160,7 +161,7 @@ TEST_CASE("AScenarioIsStrictAboutWhatWasDrawn") {
   replace("noise: none", "noise: {choice: [none]}");
   std::set<double> frictions;
   for (const std::uint64_t seed : {1, 2, 3}) {
-    const Scenario scenario = scenario_from_text(text, "wild.yaml", seed);
+    const Scenario scenario = scenario_from_text(text, "wild.yaml", test::biped(), seed);
     CHECK(scenario.friction >= 0.5);
     CHECK(scenario.friction <= 0.8);
     CHECK(std::abs(scenario.commands[0].velocity.x() - 0.1) <= 0.4);
@@ -169,13 +170,13 @@ TEST_CASE("AScenarioIsStrictAboutWhatWasDrawn") {
     CHECK(scenario.drawn[2].path == "commands[1].velocity[1]");
     frictions.insert(scenario.friction);
     // What a log keeps is the same scenario.
-    const Scenario again = scenario_from_text(scenario.text, "wild.yaml", 77);
+    const Scenario again = scenario_from_text(scenario.text, "wild.yaml", test::biped(), 77);
     CHECK(again.friction == scenario.friction);
     CHECK(again.commands[0].velocity == scenario.commands[0].velocity);
   }
   CHECK(frictions.size() == 3);
   replace("friction: {uniform: [0.5, 0.8]}", "friction: {uniform: [-2, -1]}");
-  CHECK_THROWS_AS(scenario_from_text(text, "wild.yaml", 1), config::ConfigError);
+  CHECK_THROWS_AS(scenario_from_text(text, "wild.yaml", test::biped(), 1), config::ConfigError);
 }
 
 }  // namespace stance::sim

@@ -19,7 +19,7 @@ std::string error_of(const std::string& from, const std::string& to, const std::
   REQUIRE(at != std::string::npos);
   text.replace(at, from.size(), to);
   try {
-    static_cast<void>(scenario_from_text(text, scenario + ".yaml", 1));
+    static_cast<void>(scenario_from_text(text, scenario + ".yaml", test::biped(), 1));
   } catch (const config::ConfigError& error) {
     return error.what();
   }
@@ -35,7 +35,7 @@ bool names(const std::string& message, const std::string& key) {
 
 TEST_CASE("EveryScenarioOfTheBipedLoads") {
   for (const char* name : {"stand", "stand_noisy", "single_body", "stepping", "walk", "walk_noisy"}) {
-    const Scenario scenario = load_scenario("biped", name, 1);
+    const Scenario scenario = load_scenario(test::biped(), name, 1);
     CHECK(scenario.duration == 20.0);
     CHECK(scenario.robot == "biped");
     CHECK(scenario.text.find("duration: 20.0") != std::string::npos);
@@ -43,7 +43,7 @@ TEST_CASE("EveryScenarioOfTheBipedLoads") {
 }
 
 TEST_CASE("TheDemoPushesHalfANewtonSecondForwardThreeSidewaysAndAWalkerByEight") {
-  const Scenario scenario = load_scenario("biped", "demo", 1);
+  const Scenario scenario = load_scenario(test::biped(), "demo", 1);
   REQUIRE(scenario.pushes.size() == 3);
   CHECK((scenario.pushes[0].force_W * scenario.pushes[0].duration - Vector3(0.5, 0.0, 0.0)).norm() < 1e-12);
   CHECK((scenario.pushes[1].force_W * scenario.pushes[1].duration - Vector3(0.0, 3.0, 0.0)).norm() < 1e-12);
@@ -53,8 +53,8 @@ TEST_CASE("TheDemoPushesHalfANewtonSecondForwardThreeSidewaysAndAWalkerByEight")
   CHECK(scenario.sensors.delay_steps == 1);
   CHECK(scenario.sensors.contact_delay_steps == 5);
   CHECK(scenario.sensors.noise.joint_position_resolution == 5e-4);
-  CHECK(load_scenario("biped", "stand", 1).sensors.noise.gyro_white == 0.0);
-  CHECK(load_scenario("biped", "single_body", 1).plant == Plant::kSingleBody);
+  CHECK(load_scenario(test::biped(), "stand", 1).sensors.noise.gyro_white == 0.0);
+  CHECK(load_scenario(test::biped(), "single_body", 1).plant == Plant::kSingleBody);
 }
 
 TEST_CASE("ScenarioErrorsNameTheKey") {
@@ -81,7 +81,7 @@ TEST_CASE("APushMayBeGivenByItsImpulseAndDirection") {
   std::string text = text_of("demo");
   const std::string force = "force_W: [5, 0, 0]";
   text.replace(text.find(force), force.size(), "impulse: 6.0, direction: 2.0943951023931953");
-  const ScheduledPush push = scenario_from_text(text, "demo.yaml", 1).pushes.front();
+  const ScheduledPush push = scenario_from_text(text, "demo.yaml", test::biped(), 1).pushes.front();
   CHECK((push.force_W * push.duration - Vector3(-3.0, 3.0 * std::sqrt(3.0), 0.0)).norm() < 1e-12);
 
   CHECK(names(error_of(force, "impulse: 6.0"), "pushes[1].direction is missing"));
@@ -93,7 +93,8 @@ TEST_CASE("APushMayBeGivenByItsImpulseAndDirection") {
 
 TEST_CASE("CommandsMayCease") {
   const std::string text = text_of("stand");
-  const auto scenario = scenario_from_text(text + "  - {time: 5.0, behaviour: silent}\n", "stand.yaml", 1);
+  const auto scenario =
+      scenario_from_text(text + "  - {time: 5.0, behaviour: silent}\n", "stand.yaml", test::biped(), 1);
   REQUIRE(scenario.commands.size() == 2);
   CHECK_FALSE(scenario.commands[0].silent);
   CHECK(scenario.commands[1].silent);
@@ -108,7 +109,7 @@ TEST_CASE("TerrainIsFlatOrASlopeWithOrWithoutTiles") {
     std::string text = text_of("demo");
     const std::string flat = "terrain: flat";
     text.replace(text.find(flat), flat.size(), "terrain: " + value);
-    return scenario_from_text(text, "demo.yaml", 1).terrain;
+    return scenario_from_text(text, "demo.yaml", test::biped(), 1).terrain;
   };
   CHECK(terrain("flat").is_flat());
   const TerrainModel slope = terrain("{slope: [0.17, -0.1], tiles: none}");
@@ -148,10 +149,12 @@ TEST_CASE("ASectionThatIsNoMappingIsRefusedByItsKey") {
 }
 
 TEST_CASE("AnUnknownScenarioAndAnotherRobotsAreErrors") {
-  CHECK_THROWS_AS(load_scenario("biped", "no_such", 1), config::ConfigError);
+  CHECK_THROWS_AS(load_scenario(test::biped(), "no_such", 1), config::ConfigError);
   const auto file = config::share_directory() / "sim/scenarios/biped/demo.yaml";
-  CHECK_NOTHROW(load_scenario("biped", file.string(), 1));
-  CHECK_THROWS_AS(load_scenario("catcher", file.string(), 1), config::ConfigError);
+  CHECK_NOTHROW(load_scenario(test::biped(), file.string(), 1));
+  config::RobotDescription another = test::biped();
+  another.name = "catcher";
+  CHECK_THROWS_AS(load_scenario(another, file.string(), 1), config::ConfigError);
 }
 
 }  // namespace stance::sim

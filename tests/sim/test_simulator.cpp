@@ -327,7 +327,7 @@ TEST_CASE("MassFactorsChangeThePlantAndNotTheDescription") {
   const auto robot = test::biped();
   Run nominal(scenario);
   scenario.trunk_mass_factor = 1.2;
-  scenario.leg_mass_factor = 0.9;
+  scenario.limb_mass_factor = 0.9;
   Run changed(scenario);
   const double trunk = robot.model.bodies[0].mass;
   const double expected = 1.2 * trunk + 0.9 * (robot.model.total_mass - trunk);
