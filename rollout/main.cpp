@@ -74,7 +74,7 @@ int main(int argc, char** argv) {
     record(io::channel::kRunInfo, io::encode(io::RunInfo{robot.name, command_line, robot.urdf_text, robot.yaml_text}));
 
     loop::WallClock clock;
-    rollout::Observer observer(scenario, simulator);
+    rollout::Observer observer(robot.model, scenario, simulator);
     const auto periods =
         static_cast<std::int64_t>(std::llround((duration > 0.0 ? duration : scenario.duration) / kControlPeriod));
     const auto start = std::chrono::steady_clock::now();

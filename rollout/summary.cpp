@@ -145,32 +145,38 @@ std::string as_json(const Summary& s) {
   for (const Segment& segment : s.segments) parts += (parts.empty() ? "" : ", ") + as_json(segment);
   std::ostringstream out;
   out << "{\"seed\": " << s.seed << ", \"drawn\": {" << drawn << "}, \"duration_s\": " << number(s.duration)
-      << ", \"wall_s\": " << number(s.wall) << ", \"times_real_time\": " << number(s.duration / s.wall)
-      << ", \"fallen\": " << (s.fallen() ? "true" : "false")
-      << ", \"first_fall_s\": " << (s.fallen() ? number(s.duration) : "null")
-      << ", \"fall_reason\": " << (s.fallen() ? quoted(name_of(s.fall)) : "null")
-      << ", \"fallen_on\": " << (s.fallen_on.empty() ? "null" : quoted(s.fallen_on))
-      << ", \"lying\": " << (s.lying ? "true" : "false") << ", \"max_tilt_rad\": " << number(s.max_tilt)
-      << ", \"qp_failures\": " << s.qp_failures << ", \"qp_iterations_max\": " << s.qp_iterations_max
-      << ", \"steps\": " << s.steps << ", \"p_WB\": " << list(s.p_WB) << ", \"segments\": [" << parts
-      << "], \"tick_cpu\": " << as_json(s.tick_cpu) << ", \"command_hash\": \"" << std::hex << s.command_hash
-      << "\"}\n";
+      << ", \"wall_s\": " << number(s.wall) << ", \"times_real_time\": " << number(s.duration / s.wall);
+  if (s.has_feet) {
+    out << ", \"fallen\": " << (s.fallen() ? "true" : "false")
+        << ", \"first_fall_s\": " << (s.fallen() ? number(s.duration) : "null")
+        << ", \"fall_reason\": " << (s.fallen() ? quoted(name_of(s.fall)) : "null")
+        << ", \"fallen_on\": " << (s.fallen_on.empty() ? "null" : quoted(s.fallen_on))
+        << ", \"lying\": " << (s.lying ? "true" : "false") << ", \"max_tilt_rad\": " << number(s.max_tilt)
+        << ", \"qp_failures\": " << s.qp_failures << ", \"qp_iterations_max\": " << s.qp_iterations_max
+        << ", \"steps\": " << s.steps << ", \"p_WB\": " << list(s.p_WB) << ", \"segments\": [" << parts << "]";
+  }
+  out << ", \"max_torque_share\": " << number(s.max_torque_share) << ", \"torques_saturated\": " << s.torques_saturated
+      << ", \"drives_damped_s\": " << number(s.drives_damped) << ", \"tick_cpu\": " << as_json(s.tick_cpu)
+      << ", \"command_hash\": \"" << std::hex << s.command_hash << "\"}\n";
   return out.str();
 }
 
 std::string as_text(const Summary& s) {
-  constexpr double degrees = 180.0 / M_PI;
+  constexpr double degrees = 180.0 / M_PI, percent = 100.0;
   std::ostringstream out;
   if (s.fallen()) {
     out << "fell at " << s.duration << " s (" << name_of(s.fall) << (s.fallen_on.empty() ? "" : ": ") << s.fallen_on
         << ")";
   } else {
-    out << (s.lying ? "lay down, " : "") << "no fall in " << s.duration << " s";
+    out << (s.lying ? "lay down, " : "") << (s.has_feet ? "no fall in " : "") << s.duration << " s";
   }
-  out << "; largest tilt of the trunk " << s.max_tilt * degrees << " deg; " << s.steps << " steps; " << s.qp_failures
-      << " failed QPs; ticks of " << std::setprecision(3) << s.tick_cpu.p50 << " us (median), " << s.tick_cpu.p99_9
-      << " us (99.9%); " << s.duration / s.wall << " times real time; joint commands " << std::hex << s.command_hash
-      << std::dec << "\n";
+  if (s.has_feet) {
+    out << "; largest tilt of the trunk " << s.max_tilt * degrees << " deg; " << s.steps << " steps; " << s.qp_failures
+        << " failed QPs";
+  }
+  out << std::setprecision(3) << "; at most " << percent * s.max_torque_share << " % of a joint's torque; ticks of "
+      << s.tick_cpu.p50 << " us (median), " << s.tick_cpu.p99_9 << " us (99.9%); " << s.duration / s.wall
+      << " times real time; joint commands " << std::hex << s.command_hash << std::dec << "\n";
   out << std::fixed << std::setprecision(2);
   for (const Segment& segment : s.segments) {
     if (segment.wanted.silent || segment.wanted.behaviour != Behaviour::kWalk) continue;
@@ -182,8 +188,9 @@ std::string as_text(const Summary& s) {
   return out.str();
 }
 
-Observer::Observer(const sim::Scenario& scenario, const sim::Simulator& simulator)
-    : scenario_(scenario), simulator_(simulator) {
+Observer::Observer(const rigid_body::Model& model, const sim::Scenario& scenario, const sim::Simulator& simulator)
+    : model_(model), scenario_(scenario), simulator_(simulator) {
+  so_far_.has_feet = simulator.truth().num_contacts > 0;
   look();
 }
 
@@ -199,6 +206,13 @@ void Observer::look() {
 void Observer::period(const loop::Ticker& ticker, double cpu_us) {
   const TickOutput& out = ticker.output();
   so_far_.command_hash = platform::hash(ticker.command().bytes(), so_far_.command_hash);
+  const auto& truth = simulator_.truth();
+  for (int i = 0; i < model_.num_joints; ++i) {
+    const double limit = model_.joints[static_cast<std::size_t>(i)].max_torque;
+    so_far_.max_torque_share = std::max(so_far_.max_torque_share, std::abs(truth.joint_torque[i]) / limit);
+  }
+  if (truth.drives_damped != 0) so_far_.drives_damped += kControlPeriod;
+  so_far_.torques_saturated = out.trace.fault_count[static_cast<std::size_t>(Fault::kTorqueSaturated)];
   so_far_.qp_failures = out.trace.fault_count[static_cast<std::size_t>(Fault::kQpFailed)];
   so_far_.qp_iterations_max = std::max(so_far_.qp_iterations_max, out.trace.qp_iterations);
   for (std::size_t i = 0; i < static_cast<std::size_t>(out.plan.num_contacts); ++i) {
@@ -221,7 +235,7 @@ Summary Observer::summary(std::uint64_t seed, double wall) const {
   summary.fallen_on = simulator_.fallen_on();
   summary.lying = simulator_.lying();
   summary.p_WB = {truth.p_WB[0], truth.p_WB[1], truth.p_WB[2]};
-  summary.segments = segments(scenario_.commands, path_);
+  if (summary.has_feet) summary.segments = segments(scenario_.commands, path_);
   summary.tick_cpu = tick_cpu(cpu_us_);
   return summary;
 }

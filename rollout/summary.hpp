@@ -52,10 +52,14 @@ struct Summary {
   std::vector<sim::DrawnValue> drawn;
   double duration = 0.0;  ///< s, simulated
   double wall = 0.0;      ///< s
+  bool has_feet = true;   ///< without: nothing falls, tilts, steps or goes anywhere
   kinematics::Fall fall = kinematics::Fall::kNone;
-  std::string fallen_on;  ///< the link, where a body is on the ground
-  bool lying = false;     ///< since it was told to lie down
-  double max_tilt = 0.0;  ///< rad, of the trunk
+  std::string fallen_on;               ///< the link, where a body is on the ground
+  bool lying = false;                  ///< since it was told to lie down
+  double max_tilt = 0.0;               ///< rad, of the trunk
+  double max_torque_share = 0.0;       ///< of a joint's limit, mean over a control period
+  double drives_damped = 0.0;          ///< s, without a valid command
+  std::int64_t torques_saturated = 0;  ///< ticks that clipped one
   std::int64_t qp_failures = 0;
   int qp_iterations_max = 0;
   std::int64_t steps = 0;  ///< swings that ended in stance
@@ -74,8 +78,8 @@ std::string as_text(const Summary& summary);
 /// Looks on at a rollout.
 class Observer {
  public:
-  /// Both outlive the observer.
-  Observer(const sim::Scenario& scenario, const sim::Simulator& simulator);
+  /// All outlive the observer.
+  Observer(const rigid_body::Model& model, const sim::Scenario& scenario, const sim::Simulator& simulator);
 
   /// After each control period: what was ticked in it, in `cpu_us` of the CPU.
   void period(const loop::Ticker& ticker, double cpu_us);
@@ -86,6 +90,7 @@ class Observer {
  private:
   void look();
 
+  const rigid_body::Model& model_;
   const sim::Scenario& scenario_;
   const sim::Simulator& simulator_;
   Summary so_far_;

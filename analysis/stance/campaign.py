@@ -458,13 +458,13 @@ class _Campaign:
                     Failure(trial.seed, why, trial.rollout["drawn"], command, str(log) if log.exists() else None)
                 )
         succeeded = len(trials) - len(failures)
-        stood = [trial for trial in trials if not trial.rollout["fallen"]]
+        stood = [trial for trial in trials if not trial.rollout.get("fallen")]
         means = _means(cell, stood)
         return Tally(
             name=cell.name,
             trials=len(trials),
             succeeded=succeeded,
-            fell=sum(bool(trial.rollout["fallen"]) for trial in trials),
+            fell=sum(bool(trial.rollout.get("fallen")) for trial in trials),
             interval=wilson(succeeded, len(trials)),
             asked=_asked(cell),
             met=False if any(mean.failed for mean in means) else _met(cell, rates),
@@ -522,7 +522,7 @@ class _Campaign:
         if trial is None:
             told = self._rollout(cell, seed, log if cell.measured else None)
             measured = {}
-            if cell.measured and not told["fallen"]:
+            if cell.measured and not told.get("fallen"):
                 figures = metrics.measure(Log.open(log).run()).as_dict()
                 where = f"cell {cell.name!r}: log_limits"
                 measured = {path: figure(figures, path, where) for path in sorted(_paths(cell.measured))}
@@ -594,7 +594,7 @@ class _Campaign:
 def _why(cell: Cell, trial: _Trial) -> list[str]:
     """Why a trial failed; empty where it succeeded. Raises StanceError where a limit names a figure that is absent."""
     told = trial.rollout
-    if told["fallen"]:
+    if told.get("fallen"):
         on = f" ({told['fallen_on']})" if told["fallen_on"] else ""
         return [f"fell at {told['first_fall_s']:.2f} s by {told['fall_reason'].replace('_', ' ')}{on}"]
     judged = [judge(told, list(cell.limits)), judge(_nested(trial.log), list(cell.log_limits))]

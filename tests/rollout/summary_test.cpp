@@ -35,7 +35,8 @@ std::vector<Place> circle(int periods, double yaw_rate, double crab) {
 
 /// A run of the rig that an observer looks at.
 struct Run {
-  explicit Run(const sim::Scenario& from) : scenario(from), rig(scenario), observer(scenario, rig.simulator) {}
+  explicit Run(const sim::Scenario& from)
+      : scenario(from), rig(scenario), observer(rig.robot.model, scenario, rig.simulator) {}
   void ticks(int periods) {
     for (int k = 0; k < periods && !rig.simulator.fallen(); ++k) {
       rig.tick();
@@ -135,6 +136,9 @@ TEST_CASE("AWalkTellsItsStepsItsSegmentsAndItsTicks") {
   CHECK(std::abs(summary.segments[1].mean_velocity.x() - 0.4) < 0.08);
   CHECK(summary.tick_cpu.max == 100.0 + 8 * kSecond - 1);
   CHECK(summary.qp_iterations_max > 0);
+  CHECK(summary.max_torque_share > 0.1);
+  CHECK(summary.max_torque_share <= 1.0);
+  CHECK(summary.drives_damped == 0.0);
   const YAML::Node json = YAML::Load(as_json(summary));
   CHECK(json["seed"].as<int>() == 3);
   CHECK(json["times_real_time"].as<double>() == 4.0);
