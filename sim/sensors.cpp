@@ -43,21 +43,20 @@ Sensors::Reading Sensors::measure(const rigid_body::State& before, const rigid_b
   const SensorNoise& noise = model_.noise;
   Reading reading;
   gyro_bias_ += noise.gyro_bias_walk * std::sqrt(kPhysicsStep) * normal3(random_);
-  const Vector3 w_B = after.R_WB.transpose() * after.w_WB_W;
+  const Vector3 w_B = 0.5 * (before.R_WB.transpose() * before.w_WB_W + after.R_WB.transpose() * after.w_WB_W);
   reading.gyro = w_B + gyro_bias_ + noise.gyro_white * normal3(random_);
 
-  const Matrix3 R_W_mid = before.R_WB * math::exp_so3(0.5 * kPhysicsStep * w_B);
   const Vector3 acceleration_W = (after.v_WB - before.v_WB) / kPhysicsStep + Vector3(0.0, 0.0, kGravity);
   reading.accelerometer =
-      R_W_mid.transpose() * acceleration_W + accelerometer_bias_ + noise.accelerometer_white * normal3(random_);
+      before.R_WB.transpose() * acceleration_W + accelerometer_bias_ + noise.accelerometer_white * normal3(random_);
   reading.accelerometer =
       reading.accelerometer.cwiseMax(-model_.accelerometer_limit).cwiseMin(model_.accelerometer_limit);
 
   for (int i = 0; i < num_joints_; ++i) {
-    const double position = after.q[i] + joint_position_offset_[i];
+    const double position = 0.5 * (before.q[i] + after.q[i]) + joint_position_offset_[i];
     const double resolution = noise.joint_position_resolution;
     reading.joint_position[i] = resolution > 0.0 ? resolution * std::round(position / resolution) : position;
-    reading.joint_velocity[i] = after.qd[i] + noise.joint_velocity_white * random_.normal();
+    reading.joint_velocity[i] = 0.5 * (before.qd[i] + after.qd[i]) + noise.joint_velocity_white * random_.normal();
   }
   return reading;
 }

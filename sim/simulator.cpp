@@ -231,7 +231,7 @@ void Simulator::hear(const user_command_t& command) noexcept {
 
 void Simulator::judge_fall(Fall fall) noexcept {
   if (fall == Fall::kNone || fallen() || lying_) return;
-  if (told_to_lie_ && commands_.current.mode == joint_command_t::DAMP) {
+  if (told_to_lie_ && fall != Fall::kTilt && commands_.current.mode == joint_command_t::DAMP) {
     lying_ = true;
   } else {
     fall_ = fall;

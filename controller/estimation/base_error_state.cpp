@@ -8,6 +8,11 @@ using math::skew;
 
 Vector3 gravity_W() noexcept { return {0.0, 0.0, -kGravity}; }
 
+/// What the mean velocity of a sample lacks of that under its mean acceleration.
+Vector3 velocity_by_change(const Matrix3& R_mid, const ImuMean& imu) noexcept {
+  return (imu.dt / 12.0) * (R_mid * imu.change);
+}
+
 /// R_WB at the middle of the sample that ended in `state`.
 Matrix3 middle_rotation(const BaseState& state, const ImuMean& imu) noexcept {
   return state.R_WB * exp_so3(-0.5 * imu.dt * (imu.gyro - state.gyro_bias));
@@ -59,7 +64,7 @@ Transition predict(BaseState& state, const ImuMean& imu) noexcept {
   const Matrix3 half_turn = exp_so3(0.5 * dt * (imu.gyro - state.gyro_bias));
   const Matrix3 R_mid = state.R_WB * half_turn;
   const Vector3 acceleration = R_mid * (imu.accelerometer - state.accelerometer_bias) + gravity_W();
-  const Vector3 v_mid = state.v_WB + (0.5 * dt) * acceleration;
+  const Vector3 v_mid = state.v_WB + (0.5 * dt) * acceleration - velocity_by_change(R_mid, imu);
   const Vector3 path = dt * v_mid;
 
   Transition transition;
@@ -89,7 +94,7 @@ ErrorMeasurement velocity_measurement(const BaseState& state, const ImuMean& imu
   const Vector3 w = imu.gyro - state.gyro_bias;
   const Matrix3 R_mid = middle_rotation(state, imu);
   const Vector3 acceleration = R_mid * (imu.accelerometer - state.accelerometer_bias) + gravity_W();
-  const Vector3 v_mid = state.v_WB - half_dt * acceleration;
+  const Vector3 v_mid = state.v_WB - half_dt * acceleration - velocity_by_change(R_mid, imu);
   const Vector3 a_v = R_mid * (foot.v_BF + w.cross(foot.p_BF_mid));
   const Vector3 w_link = R_mid * (w + foot.w_BF);
   const Vector3 radius(0.0, 0.0, foot_radius);

@@ -37,7 +37,10 @@ constexpr double kForgottenVelocity = 3.0;  ///< m/s, sigma of a velocity of whi
 
 double squared(double x) { return x * x; }
 
-ImuMean imu_mean(const SensorSample& sample, double dt) { return {sample.gyro, sample.accelerometer, dt}; }
+/// `change` [m/s^2]: of the accelerometer over a sample.
+ImuMean imu_mean(const SensorSample& sample, const Vector3& change, double dt) {
+  return {sample.gyro, sample.accelerometer, change, dt};
+}
 
 /// The rotation next to R, for an R that rounding alone has moved (one Newton step).
 Matrix3 orthonormal(const Matrix3& R) { return 1.5 * R - 0.5 * R * R.transpose() * R; }
@@ -146,9 +149,11 @@ void BaseEstimator::step(const RobotState& state, const ContactPlan& plan, BaseE
   const double dt = state.sample_period;
   const double since_last = static_cast<double>(state.utime) - static_cast<double>(utime_);  // us
   const double gap = kMicrosecond * since_last - kStateSamples * dt;
-  const ImuMean oldest = imu_mean(state.samples.front(), dt);
+  const Vector3 change =
+      (state.samples.back().accelerometer - state.samples.front().accelerometer) / (kStateSamples - 1);
+  const ImuMean oldest = imu_mean(state.samples.front(), Vector3::Zero(), dt);
   for (int lost = 0; lost < kMaxBridgedSamples && (lost + 0.5) * dt < gap; ++lost) advance(oldest);
-  for (const SensorSample& sample : state.samples) step_sample(sample, dt, plan);
+  for (const SensorSample& sample : state.samples) step_sample(imu_mean(sample, change, dt), sample, plan);
   state_.R_WB = orthonormal(state_.R_WB);
   utime_ = state.utime;
   write(state.now(), estimate);
@@ -182,9 +187,9 @@ void BaseEstimator::advance(const ImuMean& imu) noexcept {
   fade_correlations(kPosition, std::exp(-imu.dt / c.position_memory));
 }
 
-void BaseEstimator::step_sample(const SensorSample& sample, double dt, const ContactPlan& plan) noexcept {
+void BaseEstimator::step_sample(const ImuMean& imu, const SensorSample& sample, const ContactPlan& plan) noexcept {
   const BaseEstimatorConfig& c = config_;
-  const ImuMean imu = imu_mean(sample, dt);
+  const double dt = imu.dt;
   advance(imu);
 
   std::array<FootMeasurement, kFeet> feet;

@@ -72,7 +72,7 @@ class BaseEstimator {
 
  private:
   FootMeasurement measure_foot(const SensorSample& sample, int foot, double dt) const noexcept;
-  void step_sample(const SensorSample& sample, double dt, const ContactPlan& plan) noexcept;
+  void step_sample(const ImuMean& imu, const SensorSample& sample, const ContactPlan& plan) noexcept;
   void advance(const ImuMean& imu) noexcept;
   /// Judges a foot by its velocity, whose residual [m/s] it returns.
   Vector3 gate(const ImuMean& imu, const FootMeasurement& foot, int index) noexcept;

@@ -22,7 +22,7 @@ class RandomCase {
     for (Vector3& p_BF_W : state.p_BF_W) p_BF_W = vector(0.8);
     state.gyro_bias = vector(0.02);
     state.accelerometer_bias = vector(0.2);
-    imu = {vector(2.0), vector(5.0) + Vector3(0.0, 0.0, kGravity), 0.005};
+    imu = {vector(2.0), vector(5.0) + Vector3(0.0, 0.0, kGravity), vector(5.0), 0.005};
     foot = {vector(0.8), vector(0.8), vector(1.0), vector(3.0)};
   }
 

@@ -85,6 +85,15 @@ TEST_CASE("ItWalksAsTheOperatorWantsAndStandsAgain") {
   }
 }
 
+TEST_CASE("AStraightWalkTurnsTheEstimatedPitchByLittle") {
+  // Pitch and the accelerometer's bias are not observed apart there: what is wrong systematically adds up.
+  BipedRig rig;
+  rig.tick_times(kSettled);
+  rig.give(walk_command(1, 1.2, 0.0, 0.0));
+  rig.tick_times(10 * kSecond);
+  CHECK(std::abs(rig.trace().estimate.accelerometer_bias.x()) < 0.02);  // m/s^2, of which there is none: 2 mrad
+}
+
 TEST_CASE("APushTooHardToStandIsMetByStepsAndThenItStands") {
   constexpr double impulse = 5.0, duration = 0.1;  // N s, s
   for (int direction = 0; direction < 8; ++direction) {
