@@ -247,6 +247,14 @@ std::vector<Foot> feet_from_urdf(const std::string& urdf_text, const Model& mode
   return feet;
 }
 
+LinkPose link_pose_from_urdf(const std::string& urdf_text, const Model& model, const std::string& name) {
+  const urdf::ModelInterfaceSharedPtr robot = parse(urdf_text);
+  const urdf::LinkConstSharedPtr link = robot->getLink(name);
+  if (!link) fail(quoted("link", name), "is not in the document", "correct the name");
+  const Carrier carrier = carrier_of(*link);
+  return {model.body_index(carrier.link->name), carrier.T};
+}
+
 std::vector<CollisionShape> collision_shapes_from_urdf(const std::string& urdf_text, const Model& model) {
   const urdf::ModelInterfaceSharedPtr robot = parse(urdf_text);
   std::vector<CollisionShape> shapes;

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "controller/interface/signals.hpp"
+#include "controller/math/se3.hpp"
 
 namespace stance::rigid_body {
 
@@ -37,6 +38,12 @@ struct Foot {
   int body = 0;                   ///< body index
   Vector3 tip = Vector3::Zero();  ///< m, the sphere's centre in the link frame
   double radius = 0.0;            ///< m
+};
+
+/// A link's frame where it is fixed to a body, such as a tool's.
+struct LinkPose {
+  int body = 0;         ///< body index
+  RigidTransform T_BL;  ///< coordinates in the link's frame to those in the body's link frame
 };
 
 enum class ShapeKind { kBox, kSphere, kCylinder };
@@ -73,6 +80,9 @@ Model model_from_urdf(const std::string& urdf_text, const std::vector<std::strin
 /// std::invalid_argument where a link is unknown or has no sphere collision shape.
 std::vector<Foot> feet_from_urdf(const std::string& urdf_text, const Model& model,
                                  const std::vector<std::string>& links);
+
+/// Of the link `name`, by the fixed joints that carry it. Throws std::invalid_argument where it is unknown.
+LinkPose link_pose_from_urdf(const std::string& urdf_text, const Model& model, const std::string& name);
 
 /// Every collision shape, in the order of the bodies that carry them. Throws std::invalid_argument naming the link for
 /// a shape other than box, sphere and cylinder.
