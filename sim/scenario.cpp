@@ -16,9 +16,10 @@ namespace {
 using config::StrictYaml;
 using platform::to_text;
 
-constexpr std::array<std::string_view, 5> kBehaviourNames = {"stand", "walk", "lie-down", "track", "catch"};
+constexpr std::array<std::string_view, 6> kBehaviourNames = {"stand", "walk",  "lie-down",
+                                                             "track", "catch", "track-smooth"};
 constexpr std::string_view kSilent = "silent";  // of who commands, not of the robot
-static_assert(static_cast<int>(Behaviour::kCatch) + 1 == kBehaviourNames.size());
+static_assert(static_cast<int>(Behaviour::kTrackSmooth) + 1 == kBehaviourNames.size());
 
 double number_in(StrictYaml& yaml, const std::string& key, double lowest, double highest) {
   const double value = yaml.number(key);
@@ -182,7 +183,8 @@ ScheduledCommand command_from(StrictYaml yaml, const Kind& kind) {
   }
   const auto* known = std::find(kBehaviourNames.begin(), kBehaviourNames.end(), name);
   if (known == kBehaviourNames.end()) {
-    yaml.fail("behaviour", "is '" + name + "', but must be stand, walk, lie-down, track, catch or silent");
+    yaml.fail("behaviour",
+              "is '" + name + "', but must be stand, walk, lie-down, track, catch, track-smooth or silent");
   }
   command.behaviour = static_cast<Behaviour>(known - kBehaviourNames.begin());
   if (kind.with_feet(yaml, {"velocity", "yaw_rate", "height_offset"})) {

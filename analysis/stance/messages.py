@@ -20,6 +20,7 @@ CHANNELS = {
     "PUSH": "push_t",
     "JOINT_COMMAND": "joint_command_t",
     "FORCE_PLAN": "force_plan_t",
+    "ARM3_MOTION": "arm3_motion_t",
     "CONTROLLER_TRACE": "controller_trace_t",
     "CONTROLLER_TIMING": "controller_timing_t",
     "RUN_INFO_SIMULATOR": "run_info_t",
@@ -30,7 +31,7 @@ CHANNELS = {
 OPERATOR_CHANNELS = ("USER_COMMAND", "STOP", "PUSH")
 """sent by hand: their clock is the operator's, not the simulator's"""
 
-CONTROLLER_CHANNELS = ("JOINT_COMMAND", "FORCE_PLAN", "CONTROLLER_TRACE", "CONTROLLER_TIMING")
+CONTROLLER_CHANNELS = ("JOINT_COMMAND", "FORCE_PLAN", "ARM3_MOTION", "CONTROLLER_TRACE", "CONTROLLER_TIMING")
 """what the controller sends once a tick"""
 
 SELF_TEST_CHANNEL = "LCM_SELF_TEST"

@@ -13,7 +13,7 @@ from .series import Array, Floats, Integers, Run, match
 from .urdf import rotation_from_quaternion
 
 MIN_NORMAL_FORCE = 5.0  # N, below it a contact's friction ratio says nothing
-BEHAVIOURS = ("stand", "walk", "lie_down", "track", "catch")  # values of user_command_t.behaviour
+BEHAVIOURS = ("stand", "walk", "lie_down", "track", "catch", "track_smooth")  # values of user_command_t.behaviour
 STANDING, DOUBLE_SUPPORT, SINGLE_SUPPORT = range(3)  # values of controller_trace_t.gait_phase
 PATH_STEP = 1.0  # s between the points that measure a path, so that sway is none of it
 

@@ -53,7 +53,7 @@ inline bool starts_run(std::int64_t run_id, std::int64_t seq, const RobotState& 
   return state.run_id != run_id || (state.seq == 1 && seq > 1);
 }
 
-enum class Behaviour : std::int8_t { kStand = 0, kWalk = 1, kLieDown = 2, kTrack = 3, kCatch = 4 };
+enum class Behaviour : std::int8_t { kStand = 0, kWalk = 1, kLieDown = 2, kTrack = 3, kCatch = 4, kTrackSmooth = 5 };
 
 struct UserCommand {
   std::int64_t utime = 0;
@@ -176,6 +176,22 @@ struct Trace {
   int torques_clipped = 0;
 };
 
+/// One step of the 3-joint arm's motion, as document 004 prints it; all in the arm's base frame A.
+struct Arm3Motion {
+  std::int64_t step = 0;                      ///< of the motion that is played: 1, 2, ...; 0 while there is none
+  double time = 0.0;                          ///< s, from the motion's beginning to this instant
+  Vector3 theta = Vector3::Zero();            ///< rad, at this instant, integrated
+  Vector3 given_rate = Vector3::Zero();       ///< rad/s, what is played
+  Vector3 calculated_rate = Vector3::Zero();  ///< rad/s, recovered from (v, omega)
+  Vector3 v = Vector3::Zero();                ///< m/s, of the end effector
+  Vector3 omega = Vector3::Zero();            ///< rad/s, the same
+  Vector3 dp = Vector3::Zero();               ///< m, in this step
+  Vector3 dphi = Vector3::Zero();             ///< rad, in this step
+  Eigen::Matrix4d map = Eigen::Matrix4d::Identity();  ///< T_A3 after it, kept by velocities alone
+  Eigen::Matrix<double, 6, 3> jacobian =
+      Eigen::Matrix<double, 6, 3>::Zero();  ///< (v, omega) = J thetad at this instant
+};
+
 /// What a tick is given. Everything that a decision may depend on is here, so that a log of it replays bit for bit.
 struct TickInput {
   RobotState state;            ///< the newest, as it came: not yet validated
@@ -185,9 +201,11 @@ struct TickInput {
   bool operator_stop = false;  ///< a stop_t has arrived in this run
 };
 
+/// Each robot fills what it publishes (loop::Controller), and the command and the trace.
 struct TickOutput {
   JointCommand command;
   ForcePlan plan;
+  Arm3Motion arm3_motion;
   Trace trace;
 };
 

@@ -1,6 +1,7 @@
 #include "controller/io/codec.hpp"
 
 #include <algorithm>
+#include <stance_msgs/arm3_motion_t.hpp>
 #include <stance_msgs/controller_timing_t.hpp>
 #include <stance_msgs/controller_trace_t.hpp>
 #include <stance_msgs/force_plan_t.hpp>
@@ -12,6 +13,7 @@
 namespace stance::io {
 namespace {
 
+using stance_msgs::arm3_motion_t;
 using stance_msgs::controller_timing_t;
 using stance_msgs::controller_trace_t;
 using stance_msgs::force_plan_t;
@@ -115,6 +117,8 @@ std::optional<std::int64_t> tick_of(std::string_view channel, Bytes bytes) noexc
   if (channel == io::channel::kJointCommand && decode_whole(bytes, command)) return command.seq;
   force_plan_t plan{};
   if (channel == io::channel::kForcePlan && decode_whole(bytes, plan)) return plan.seq;
+  arm3_motion_t motion{};
+  if (channel == io::channel::kArm3Motion && decode_whole(bytes, motion)) return motion.seq;
   return std::nullopt;
 }
 
@@ -146,6 +150,23 @@ void encode(const Header& header, const ForcePlan& plan, Message& out) noexcept 
   }
   for (std::size_t c = 0; c < kMaxContacts; ++c) copy_out(plan.p_WF[c], message.p_WF[c]);
   message.effort = plan.effort;
+  encode_whole(message, out);
+}
+
+void encode(const Header& header, const Arm3Motion& motion, Message& out) noexcept {
+  arm3_motion_t message{};
+  set_header(header, message);
+  message.step = motion.step;
+  message.time = motion.time;
+  copy_out(motion.theta, message.theta);
+  copy_out(motion.given_rate, message.given_rate);
+  copy_out(motion.calculated_rate, message.calculated_rate);
+  copy_out(motion.v, message.v);
+  copy_out(motion.omega, message.omega);
+  copy_out(motion.dp, message.dp);
+  copy_out(motion.dphi, message.dphi);
+  for (int row = 0; row < motion.map.rows(); ++row) copy_out(motion.map.row(row), message.map_A3[row]);
+  for (int row = 0; row < motion.jacobian.rows(); ++row) copy_out(motion.jacobian.row(row), message.jacobian[row]);
   encode_whole(message, out);
 }
 

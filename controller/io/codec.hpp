@@ -20,6 +20,7 @@ inline constexpr const char* kUserCommand = "USER_COMMAND";
 inline constexpr const char* kStop = "STOP";
 inline constexpr const char* kJointCommand = "JOINT_COMMAND";
 inline constexpr const char* kForcePlan = "FORCE_PLAN";
+inline constexpr const char* kArm3Motion = "ARM3_MOTION";
 inline constexpr const char* kTrace = "CONTROLLER_TRACE";
 inline constexpr const char* kTiming = "CONTROLLER_TIMING";
 inline constexpr const char* kRunInfo = "RUN_INFO_CONTROLLER";
@@ -87,6 +88,7 @@ struct Message {
 
 void encode(const Header& header, const JointCommand& command, Message& out) noexcept;
 void encode(const Header& header, const ForcePlan& plan, Message& out) noexcept;
+void encode(const Header& header, const Arm3Motion& motion, Message& out) noexcept;
 void encode(const Header& header, const Consumed& consumed, const Trace& trace, Message& out) noexcept;
 void encode(const Header& header, const Timing& timing, Message& out) noexcept;
 

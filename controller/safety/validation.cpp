@@ -47,7 +47,7 @@ bool state_is_plausible(const ValidationConfig& config, const rigid_body::Model&
 
 bool command_is_plausible(const UserCommand& command) noexcept {
   return command.velocity.allFinite() && std::isfinite(command.yaw_rate) && std::isfinite(command.height_offset) &&
-         command.behaviour >= Behaviour::kStand && command.behaviour <= Behaviour::kCatch;
+         command.behaviour >= Behaviour::kStand && command.behaviour <= Behaviour::kTrackSmooth;
 }
 
 bool joint_outside_limits(const rigid_body::Model& model, const JointVector& position) noexcept {
