@@ -47,4 +47,32 @@ Vector3 arm3_given_rates(double t) noexcept {
   return {outer, 0.1 - 0.01 * (t - 5.0), outer};
 }
 
+Vector3 arm3_smooth_rates(const Vector3& peak, double duration, double t) noexcept {
+  if (t < 0.0 || t > duration) return Vector3::Zero();
+  const double s = std::sin(2.0 * M_PI * t / duration);
+  return peak * (s * s * s);
+}
+
+void Arm3Integrator::start(const Vector3& theta) noexcept {
+  theta_ = theta;
+  map_ = arm3_forward(arm_, theta);
+}
+
+void Arm3Integrator::step(const Vector3& given_rate, double dt, Arm3Motion& out) noexcept {
+  const Arm3Jacobian J = arm3_jacobian(arm_, theta_);
+  const Vector6 xi = J * given_rate;
+  out.theta = theta_;
+  out.given_rate = given_rate;
+  out.calculated_rate = arm3_inverse_velocity(J, xi);
+  out.v = xi.head<3>();
+  out.omega = xi.tail<3>();
+  out.dp = out.v * dt;
+  out.dphi = out.omega * dt;
+  map_ = updated_map(map_, xi, dt);
+  out.map.topLeftCorner<3, 3>() = map_.R;
+  out.map.topRightCorner<3, 1>() = map_.p;
+  out.jacobian = J;
+  theta_ += out.calculated_rate * dt;
+}
+
 }  // namespace stance::kinematics

@@ -15,6 +15,7 @@
 #include <Eigen/Core>
 
 #include "controller/math/se3.hpp"
+#include "controller/rigid_body/model.hpp"
 
 namespace stance::kinematics {
 
@@ -24,6 +25,10 @@ struct Arm3Geometry {
 
 /// Linear rows first, as the document has it.
 using Arm3Jacobian = Eigen::Matrix<double, 6, 3>;
+
+/// Of a model whose three joints are these, in order, and whose `tool` link is the end effector's frame 3; the model's
+/// base is A. Throws std::invalid_argument naming what is otherwise.
+Arm3Geometry arm3_geometry(const rigid_body::Model& model, const rigid_body::LinkPose& tool);
 
 /// T_A3, of t1..t3 (rad).
 RigidTransform arm3_forward(const Arm3Geometry& arm, const Vector3& theta) noexcept;
@@ -41,5 +46,28 @@ RigidTransform updated_map(const RigidTransform& A, const Vector6& xi, double dt
 
 /// The document's given rates (rad/s) at t (s): they jump at 1, 5 and 6 s, and are 0 after 16 s.
 Vector3 arm3_given_rates(double t) noexcept;
+
+/// Rates (rad/s) at t (s) that leave and come back without a jump up to their second derivative:
+/// peak sin^3(2 pi t / duration) in 0..duration, 0 elsewhere.
+Vector3 arm3_smooth_rates(const Vector3& peak, double duration, double t) noexcept;
+
+/// The document's loop: rates to velocities, velocities to rates by least squares, angles by Euler's method from those,
+/// and the map by the velocities alone.
+class Arm3Integrator {
+ public:
+  explicit Arm3Integrator(const Arm3Geometry& arm) : arm_(arm) { start(Vector3::Zero()); }
+
+  /// At the angles theta (rad), the map as they have it.
+  void start(const Vector3& theta) noexcept;
+  /// One step of dt (s) at the given rates (rad/s). Fills all of `out` but its number and its time.
+  void step(const Vector3& given_rate, double dt, Arm3Motion& out) noexcept;
+
+  const Vector3& theta() const noexcept { return theta_; }  ///< rad
+
+ private:
+  Arm3Geometry arm_;
+  Vector3 theta_ = Vector3::Zero();
+  RigidTransform map_;
+};
 
 }  // namespace stance::kinematics
