@@ -7,7 +7,9 @@
 #include <memory>
 #include <string_view>
 
+#include "controller/behaviours/arm3_controller.hpp"
 #include "controller/behaviours/biped_controller.hpp"
+#include "controller/config/arm3_config_yaml.hpp"
 #include "controller/config/biped_config_yaml.hpp"
 
 namespace stance {
@@ -26,11 +28,16 @@ loop::Controller biped(const config::RobotDescription& robot) {
           {loop::kForcePlan}};
 }
 
+loop::Controller arm3(const config::RobotDescription& robot) {
+  return {ticks_of(std::make_shared<behaviours::Arm3Controller>(config::arm3_config(robot), robot.model)),
+          {loop::kArm3Motion}};
+}
+
 struct Entry {
   std::string_view robot;
   loop::Controller (*compose)(const config::RobotDescription& robot);
 };
-constexpr std::array kRobots = {Entry{"biped", biped}};
+constexpr std::array kRobots = {Entry{"biped", biped}, Entry{"arm3", arm3}};
 
 }  // namespace
 

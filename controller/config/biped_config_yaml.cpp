@@ -1,5 +1,6 @@
 #include "controller/config/biped_config_yaml.hpp"
 
+#include "controller/config/safety_yaml.hpp"
 #include "controller/config/strict_yaml.hpp"
 
 namespace stance::config {
@@ -216,16 +217,6 @@ behaviours::TorqueMapConfig torque_map(StrictYaml yaml) {
   return c;
 }
 
-void safety(StrictYaml yaml, behaviours::BipedConfig& c) {
-  c.fault_ladder.hold_time = yaml.number("hold_time");
-  c.fault_ladder.damp_time = yaml.number("damp_time");
-  c.validation.max_angular_velocity = yaml.number("max_angular_velocity");
-  c.validation.max_acceleration = yaml.number("max_acceleration");
-  c.validation.joint_position_margin = yaml.number("joint_position_margin");
-  c.validation.joint_velocity_factor = yaml.number("joint_velocity_factor");
-  yaml.finish();
-}
-
 }  // namespace
 
 behaviours::BipedConfig biped_config(const RobotDescription& robot) {
@@ -242,7 +233,7 @@ behaviours::BipedConfig biped_config(const RobotDescription& robot) {
   c.walk = walk(yaml.mapping("walk"));
   c.stepping = stepping(yaml.mapping("stepping"));
   c.torque_map = torque_map(yaml.mapping("torque_map"));
-  safety(yaml.mapping("safety"), c);
+  read_safety(yaml.mapping("safety"), c.fault_ladder, c.validation);
   yaml.finish();
   c.damping = robot.drives.damping;
   c.fallen = robot.fallen;

@@ -25,6 +25,7 @@ constexpr Publication publication(const char* channel) noexcept {
           }};
 }
 inline constexpr Publication kForcePlan = publication<&TickOutput::plan>(io::channel::kForcePlan);
+inline constexpr Publication kArm3Motion = publication<&TickOutput::arm3_motion>(io::channel::kArm3Motion);
 
 /// What a loop needs of a robot's controller.
 struct Controller {
