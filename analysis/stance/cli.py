@@ -302,6 +302,22 @@ def _info(options: argparse.Namespace) -> int:
     return GOOD
 
 
+def _steps(options: argparse.Namespace) -> int:
+    from dataclasses import asdict
+
+    from .arm3 import steps
+    from .log import Log
+
+    run = Log.open(options.log).run(options.run)
+    found = steps(run, options.motion, options.first, options.last)
+    if options.json:
+        print(to_json([asdict(step) for step in found]))
+    elif not options.silent:
+        for step in found:
+            print(step.as_text(), end="\n\n")
+    return GOOD
+
+
 def _command(options: argparse.Namespace) -> int:
     from .command import Command, load_script, publish
     from .network import connect, join, newest
@@ -393,6 +409,12 @@ def _parser() -> argparse.ArgumentParser:
     info = add("info", _info, "What a log holds: channels, counts, rates, gaps, versions, and what was skipped.")
     _add_log(info)
 
+    steps = add("steps", _steps, "Prints the steps of the 3-joint arm's motion as document 004's terminal does.")
+    _add_log(steps, with_run=True)
+    steps.add_argument("--motion", type=_count, default=1, metavar="N", help="of the log, from 1 (default: the first)")
+    steps.add_argument("--from", dest="first", type=_count, default=1, metavar="N", help="first step (default: 1)")
+    steps.add_argument("--to", dest="last", type=_count, metavar="N", help="last step (default: the motion's)")
+
     report = add("report", _report, "Writes report.html, summary.json and plots/ for a log; exit 1 by its verdict.")
     _add_log(report, with_run=True)
     _add_limits(report)
@@ -451,7 +473,9 @@ def _parser() -> argparse.ArgumentParser:
     campaign.add_argument("--table", type=Path, metavar="FILE", help="and draw it between this Markdown file's marks")
 
     command = add("command", _command, "Commands a robot ten times a second until Ctrl-C, and then to stand.")
-    command.add_argument("--behaviour", choices=("walk", "stand", "lie-down"), help="(default: walk)")
+    command.add_argument(
+        "--behaviour", choices=("walk", "stand", "lie-down", "track", "track-smooth"), help="(default: walk)"
+    )
     command.add_argument("--vx", type=_finite, metavar="M/S", help="forward")
     command.add_argument("--vy", type=_finite, metavar="M/S", help="to the left")
     command.add_argument("--yaw-rate", type=_finite, metavar="RAD/S", help="to the left")

@@ -25,7 +25,7 @@ PERIOD = 0.1  # s, well within the time after which a controller no longer belie
 CHANNEL = "USER_COMMAND"
 TAG_SIZE = 16  # bytes of the message's tag, which has no use here
 LIE_DOWN = "lie-down"
-BEHAVIOURS = ("stand", "walk", LIE_DOWN, "track", "catch")
+BEHAVIOURS = ("stand", "walk", LIE_DOWN, "track", "catch", "track-smooth")
 SILENT = "silent"  # of who commands, not of the robot
 
 

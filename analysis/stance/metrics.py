@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import configuration, signals
+from .arm3 import Motion, motions
 from .estimation import EstimatorError, estimator_error
 from .messages import CHANNELS
 from .series import Array, Floats, Integers, Run, missing_after, restarted
@@ -208,7 +209,7 @@ class LogQuality:
 
 @dataclass(frozen=True)
 class Metrics:
-    """The whole run. Sections are None where the log lacks their channel."""
+    """The whole run. Sections are None where the log lacks their channel, or the robot has no such thing."""
 
     run_id: int
     duration: float
@@ -231,6 +232,8 @@ class Metrics:
     """None where the robot never had a gait"""
     segments: list[Segment]
     """between two user commands that want different things"""
+    motions: list[Motion]
+    """of the 3-joint arm"""
     pushes: list[Push]
     refused: dict[str, int]
     refused_total: int
@@ -253,23 +256,25 @@ def measure(run: Run, report: LogReport | None = None) -> Metrics:
     fell_at = fall(run)
     refused = refusals(run)
     damped = run.field("TRUTH", "drives_damped") if "TRUTH" in run else None
+    on_feet = not signals.on_fixed_base(run)
     return Metrics(
         run_id=run.run_id,
         duration=run.duration,
         fell=fell_at is not None,
         fell_at=fell_at,
         behaviour_final=behaviour_final(run),
-        trunk=trunk(run),
-        center_of_mass=center_of_mass(run),
+        trunk=trunk(run) if on_feet else None,
+        center_of_mass=center_of_mass(run) if on_feet else None,
         ticks=ticks(run),
         timing=timing(run),
-        qp=force_qp(run),
+        qp=force_qp(run) if on_feet else None,
         friction=friction(run),
         force_error=force_error(run),
         joints=joints(run),
-        estimator=estimator_error(run),
-        walking=walking(run),
-        segments=segments(run),
+        estimator=estimator_error(run) if on_feet else None,
+        walking=walking(run) if on_feet else None,
+        segments=segments(run) if on_feet else [],
+        motions=motions(run),
         pushes=pushes(run),
         refused=refused,
         refused_total=sum(refused.values()),

@@ -12,7 +12,8 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 from scipy.stats import chi2
 
-from . import configuration, estimation, metrics, signals, style, walking
+from . import arm3, configuration, estimation, metrics, signals, style, walking
+from .arm_plots import joint_rates, tracking, way
 from .check import Verdict
 from .gait_plots import footholds, gait, maps, swing, velocity
 from .metrics import Metrics
@@ -46,8 +47,10 @@ def summary_card(run: Run, measured: Metrics, verdict: Verdict | None = None) ->
     ax.add_patch(Rectangle((0.0, 0.0), WIDTH, 1.15, color=colour, lw=0))
     word = "PASS" if passed else "FAIL"
     ax.text(0.35, 0.58, word, fontsize=30, fontweight="bold", color="white", va="center")
-    outcome = f"stood {run.duration:.1f} s"
-    if measured.fell_at is not None:
+    outcome = f"{'ran' if signals.on_fixed_base(run) else 'stood'} {run.duration:.1f} s"
+    if measured.motions:
+        outcome = f"{counted(len(measured.motions), 'motion')} in {run.duration:.1f} s"
+    elif measured.fell_at is not None:
         outcome = f"fell after {measured.fell_at:.2f} s"
     elif measured.walking is not None:
         outcome = (
@@ -60,7 +63,9 @@ def summary_card(run: Run, measured: Metrics, verdict: Verdict | None = None) ->
         else ""
     )
     pushes = ", ".join(style.push_text(push) for push in measured.pushes[:4]) or "no push"
-    ax.text(2.25, 0.80, f"{pushes}   {kept}", fontsize=9.5, color="white", va="center", alpha=0.95)
+    if signals.on_fixed_base(run):
+        pushes = ""
+    ax.text(2.25, 0.80, "   ".join(filter(None, (pushes, kept))), fontsize=9.5, color="white", va="center", alpha=0.95)
 
     y = 1.5
     for name, text in _run_facts(run, measured):
@@ -568,23 +573,31 @@ class Plot:
     """whether the log holds what it draws: only then may it be drawn"""
 
 
+def _on_feet(possible: Callable[[Run], bool]) -> Callable[[Run], bool]:
+    """Of a plot that is of a robot with feet alone."""
+    return lambda run: not signals.on_fixed_base(run) and possible(run)
+
+
 PLOTS = {
-    "picture": Plot("The robot", picture, drawable),
+    "picture": Plot("The robot", picture, _on_feet(drawable)),
+    "arm": Plot("The arm", way, arm3.plays),
+    "joint_rates": Plot("Joint rates: calculated over given", joint_rates, arm3.plays),
+    "tracking": Plot("Tracking, and the map kept by velocities", tracking, arm3.plays),
     "walk": Plot("The walk from the side", walk, walks),
     "timing": Plot("Tick period and stage times", timing, lambda run: "CONTROLLER_TIMING" in run),
-    "center_of_mass": Plot("Centre of mass and base", center_of_mass, lambda run: "CONTROLLER_TRACE" in run),
+    "center_of_mass": Plot("Centre of mass and base", center_of_mass, _on_feet(lambda run: "CONTROLLER_TRACE" in run)),
     "forces": Plot(
         "Ground reaction forces",
         forces,
         lambda run: signals.num_contacts(run) > 0 and ("FORCE_PLAN" in run or "TRUTH" in run),
     ),
     "gait": Plot("Gait", gait, lambda run: signals.num_contacts(run) > 0),
-    "velocity": Plot("Velocity", velocity, lambda run: "CONTROLLER_TRACE" in run),
+    "velocity": Plot("Velocity", velocity, _on_feet(lambda run: "CONTROLLER_TRACE" in run)),
     "footholds": Plot("Footholds from above", footholds, maps),
     "swing": Plot("Swing tracking and stance slip", swing, lambda run: len(walking.steps(run)) > 0),
-    "estimator": Plot("Estimator", estimator, lambda run: estimation.errors(run) is not None),
+    "estimator": Plot("Estimator", estimator, _on_feet(lambda run: estimation.errors(run) is not None)),
     "joints": Plot("Joints", joints, lambda run: metrics.joint_shares(run) is not None),
-    "force_qp": Plot("Force QP", force_qp, lambda run: "CONTROLLER_TRACE" in run),
+    "force_qp": Plot("Force QP", force_qp, _on_feet(lambda run: "CONTROLLER_TRACE" in run)),
 }
 """name → plot, in the report's order; the summary card also takes the metrics and the verdict"""
 

@@ -13,6 +13,7 @@ import jinja2
 from matplotlib.figure import Figure
 
 from . import __version__, configuration, plots, signals, style
+from .arm3 import Motion
 from .check import DIRECTORY, SHARE, Verdict, judge, limits_file, load_limits, quantity
 from .errors import StanceError
 from .log import Log
@@ -161,6 +162,8 @@ def tables(metrics: Metrics, estimator: Verdict | None = None) -> list[Table]:
         found.append(Table("Walking", ["figure", "value"], _walking(metrics.walking)))
         head = ["command", "wanted", "walked", "straight way", "steps", "cost of transport"]
         found.append(Table("Walking by command", head, [_segment(one) for one in metrics.segments]))
+    for number, motion in enumerate(metrics.motions, 1):
+        found.append(Table(f"Motion {number}: {motion.behaviour}", ["figure", "value"], _arm_motion(motion)))
     if estimator is not None:
         marks = {True: "✓", False: "✗"}
         rows = [
@@ -258,6 +261,21 @@ def _walking(found: Walking) -> list[list[str]]:
         ("slip of a stance, true, p50 / p99 / max", tail(found.slip)),
     ]
     return [[name, value] for name, value in rows if value is not None]
+
+
+def _arm_motion(of: Motion) -> list[list[str]]:
+    rows: list[tuple[str, float | None, str]] = [
+        ("begins at", of.start, "s"),
+        ("steps", of.steps, ""),
+        ("joint from its reference, largest", of.error_max, "rad"),
+        ("joint from its reference, rms", of.error_rms, "rad"),
+        ("end effector from its reference, largest", of.tool_error_max, "m"),
+        ("calculated less given joint rate, largest", of.rate_error_max, "rad/s"),
+        ("map less forward kinematics after 600 steps", of.map_error_at_600, "m"),
+        ("map less forward kinematics after the last step", of.map_error_final, "m"),
+        ("orthonormality of the map, largest defect", of.orthonormality_max, ""),
+    ]
+    return [[name, quantity(value, unit)] for name, value, unit in rows if value is not None]
 
 
 def _segment(one: Segment) -> list[str]:

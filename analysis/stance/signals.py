@@ -74,6 +74,11 @@ def num_contacts(run: Run) -> int:
     return 0
 
 
+def on_fixed_base(run: Run) -> bool:
+    """Whether the robot has no feet: it neither stands nor falls, and no force QP holds it up."""
+    return ("ROBOT_STATE" in run or "TRUTH" in run) and num_contacts(run) == 0
+
+
 def num_joints(run: Run) -> int:
     """Joints in use."""
     return int(run.field("ROBOT_STATE", "num_joints").max()) if "ROBOT_STATE" in run else 0
