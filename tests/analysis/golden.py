@@ -8,9 +8,15 @@ from pathlib import Path
 from typing import Any
 
 
+def load(name: str) -> dict[str, Any]:
+    """The whole file."""
+    directory = Path(os.environ.get("STANCE_GOLDEN_DIR", Path(__file__).parents[1] / "golden"))
+    content: dict[str, Any] = json.loads((directory / name).read_text())
+    return content
+
+
 def golden_cases(name: str) -> list[dict[str, Any]]:
     """The cases of a file, at least one."""
-    directory = Path(os.environ.get("STANCE_GOLDEN_DIR", Path(__file__).parents[1] / "golden"))
-    cases: list[dict[str, Any]] = json.loads((directory / name).read_text())["cases"]
+    cases: list[dict[str, Any]] = load(name)["cases"]
     assert cases
     return cases
