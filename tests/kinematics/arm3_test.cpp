@@ -28,18 +28,16 @@ Arm3Geometry geometry(const YAML::Node& c) {
 /// The arm's map kept by velocities alone, beside its joint angles by Euler's method.
 struct Walk {
   Arm3Geometry arm;
-  Vector3 theta = Vector3::Zero();
-  RigidTransform map = arm3_forward(arm, theta);
-  Vector6 xi = Vector6::Zero();  ///< of the last step
+  Arm3Integrator integrator{arm};
+  Arm3Motion motion;  ///< of the last step
 
-  void step(const Vector3& thetad) {
-    xi = arm3_jacobian(arm, theta) * thetad;
-    map = updated_map(map, xi, kDt);
-    theta += thetad * kDt;
+  void step(const Vector3& thetad) { integrator.step(thetad, kDt, motion); }
+  double position_error() const {
+    return (motion.map.topRightCorner<3, 1>() - arm3_forward(arm, integrator.theta()).p).norm();
   }
-  double position_error() const { return (map.p - arm3_forward(arm, theta).p).norm(); }
   double orthonormality_defect() const {
-    return max_difference(map.R.transpose() * map.R, Matrix3(Matrix3::Identity()));
+    const Matrix3 R = motion.map.topLeftCorner<3, 3>();
+    return max_difference(R.transpose() * R, Matrix3(Matrix3::Identity()));
   }
 };
 
@@ -130,10 +128,10 @@ TEST_CASE("MapKeptByVelocitiesStaysWithTheArm") {
       CHECK(walk.orthonormality_defect() < kOrthonormal);
       if (sample == samples.size() || samples[sample]["n"].as<int>() != k + 1) continue;
       const YAML::Node& golden = samples[sample++];
-      CHECK(max_difference(walk.theta, golden_vector<3>(golden, "theta")) < kGolden);
-      CHECK(max_difference(walk.xi.head<3>(), golden_vector<3>(golden, "v")) < kGolden);
-      CHECK(max_difference(walk.xi.tail<3>(), golden_vector<3>(golden, "omega")) < kGolden);
-      CHECK(max_difference(homogeneous(walk.map), golden_matrix<4, 4>(golden, "map_exact")) < kGolden);
+      CHECK(max_difference(walk.integrator.theta(), golden_vector<3>(golden, "theta")) < kGolden);
+      CHECK(max_difference(walk.motion.v, golden_vector<3>(golden, "v")) < kGolden);
+      CHECK(max_difference(walk.motion.omega, golden_vector<3>(golden, "omega")) < kGolden);
+      CHECK(max_difference(walk.motion.map, golden_matrix<4, 4>(golden, "map_exact")) < kGolden);
     }
     CHECK(sample > 0);
     CHECK(walk.position_error() <= with.position);
@@ -145,10 +143,36 @@ TEST_CASE("LeastSquaresFindsTheGivenRatesAgain") {
   Walk walk;
   for (int k = 0; k < 1600; ++k) {
     const Vector3 given = arm3_given_rates(k * kDt);
-    const Arm3Jacobian J = arm3_jacobian(walk.arm, walk.theta);
     walk.step(given);
-    CHECK(max_difference(arm3_inverse_velocity(J, walk.xi), given) < kGolden);
+    CHECK(max_difference(walk.motion.calculated_rate, given) < kGolden);
+    CHECK(walk.motion.given_rate == given);
   }
+}
+
+TEST_CASE("TheMapBeginsWhereTheArmDoes") {
+  Arm3Integrator integrator{Arm3Geometry{}};
+  const Vector3 theta(0.3, -0.8, 1.1);
+  integrator.start(theta);
+  Arm3Motion motion;
+  integrator.step(Vector3::Zero(), kDt, motion);
+  CHECK(max_difference(motion.map, homogeneous(arm3_forward({}, theta))) < kOrthonormal);
+  CHECK(integrator.theta() == theta);
+}
+
+TEST_CASE("SmoothRatesLeaveAndReturnWithoutAJumpUpToTheirSecondDerivative") {
+  const Vector3 peak(0.5, -0.2, 0.4);
+  constexpr double duration = 12.0, h = 1e-3;
+  CHECK(arm3_smooth_rates(peak, duration, -h).isZero());
+  CHECK(arm3_smooth_rates(peak, duration, duration + h).isZero());
+  CHECK(max_difference(arm3_smooth_rates(peak, duration, duration / 4.0), peak) < kOrthonormal);
+  Vector3 way = Vector3::Zero();
+  for (int k = -10; k < static_cast<int>(duration / h) + 10; ++k) {
+    const auto rate = [&](int at) { return arm3_smooth_rates(peak, duration, at * h); };
+    const Vector3 third = (rate(k + 3) - 3.0 * rate(k + 2) + 3.0 * rate(k + 1) - rate(k)) / (h * h * h);
+    CHECK(third.norm() < 2.0);  // of a jump in the second derivative it would be 1 / h times that
+    way += rate(k) * h;
+  }
+  CHECK(way.norm() < 1e-9);
 }
 
 TEST_CASE("LiteralModeReproducesTheDocumentsTerminal") {

@@ -5,7 +5,7 @@
 #include <stance_msgs/stop_t.hpp>
 #include <vector>
 
-#include "tests/loop/biped_rig.hpp"
+#include "tests/loop/arm3_rig.hpp"
 #include "tests/support/heap_calls.hpp"
 
 namespace stance::test {
@@ -62,6 +62,39 @@ TEST_CASE("AThousandTicksWithPushesAndFaultsMakeNoHeapCall") {
     CHECK(ticks_in_mode[1] == 2);   // hold, at 300 and 400
     CHECK(ticks_in_mode[2] == 50);  // damp, from 1050 on
   }
+}
+
+TEST_CASE("ThreeThousandTicksOfAnArmMakeNoHeapCall") {
+  constexpr int warm_up = 100, ticks = 3000;
+  sim::Scenario scenario = sim::load_scenario(arm3(), "demo", 1);
+  Arm3Rig rig(scenario);
+  std::vector<ByteVector> states, commands;
+  for (int k = 0; k < ticks; ++k) {
+    const auto* command = rig.simulator.user_command();
+    commands.push_back(command != nullptr ? bytes_of(*command) : ByteVector{});
+    if (command != nullptr) static_cast<void>(rig.ticker.offer_user_command(commands.back()));
+    states.push_back(bytes_of(rig.state()));
+    rig.tick();
+  }
+  loop::Ticker ticker(compose(arm3()));
+  loop::WallClock clock;
+  long before = 0;
+  int refused = 0, playing = 0, damped = 0;
+  for (std::size_t k = 0; k < states.size(); ++k) {
+    if (k == warm_up) before = heap_calls;
+    clock.start();
+    if (!commands[k].empty()) refused += !ticker.offer_user_command(commands[k]);
+    if (k < 2000 || k > 2010) refused += !ticker.offer_state(states[k]);  // a gap: hold and damp
+    ticker.tick(1, clock);
+    clock.finish();
+    playing += ticker.output().arm3_motion.step > 0;
+    damped += ticker.output().trace.safety == SafetyMode::kDamp;
+  }
+  const long after = heap_calls;
+  CHECK(after == before);
+  CHECK(refused == 0);
+  CHECK(playing > 1700);
+  CHECK(damped > 0);
 }
 
 }  // namespace stance::test

@@ -258,8 +258,9 @@ TEST_CASE("WithEngineChangesTheEngineAndNothingElse") {
 }
 
 TEST_CASE("ARobotWithoutAControllerIsRefusedByName") {
-  CHECK_THROWS_MATCHES(compose(test::biped_with("robot", "centipede")), ConfigError,
-                       MessageMatches(ContainsSubstring("centipede") && ContainsSubstring("there is one for biped")));
+  CHECK_THROWS_MATCHES(
+      compose(test::biped_with("robot", "centipede")), ConfigError,
+      MessageMatches(ContainsSubstring("centipede") && ContainsSubstring("there is one for biped, arm3")));
 }
 
 TEST_CASE("AnEngineForARobotWithoutAForceQpIsRefused") {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <stance_msgs/force_plan_t.hpp>
 #include <stance_msgs/stop_t.hpp>
+#include <string_view>
 
 namespace stance::test {
 namespace {
@@ -62,7 +63,10 @@ double BipedRig::tilt() const {
 void BipedRig::answer() {
   loop::NoClock clock;
   ticker.tick(1, clock);
-  simulator.accept(decoded<stance_msgs::force_plan_t>(ticker.published().front().message.bytes()));
+  for (const auto& [channel, message] : ticker.published()) {
+    if (std::string_view(channel) != io::channel::kForcePlan) continue;
+    simulator.accept(decoded<stance_msgs::force_plan_t>(message.bytes()));
+  }
   simulator.accept(decoded<stance_msgs::joint_command_t>(ticker.command().bytes()));
   simulator.advance();
 }

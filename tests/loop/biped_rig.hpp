@@ -39,6 +39,7 @@ struct Answer {
 };
 Answer answer_of(const loop::Ticker& ticker);
 
+/// What is of no robot in particular serves every one of them.
 class BipedRig {
  public:
   explicit BipedRig(const sim::Scenario& scenario = quiet_stand(), const config::RobotDescription& robot = biped(),

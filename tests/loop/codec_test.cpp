@@ -5,6 +5,7 @@
 #include <catch2/catch_test_macros.hpp>
 #include <random>
 #include <set>
+#include <stance_msgs/arm3_motion_t.hpp>
 #include <stance_msgs/controller_timing_t.hpp>
 #include <stance_msgs/controller_trace_t.hpp>
 #include <stance_msgs/force_plan_t.hpp>
@@ -313,6 +314,38 @@ TEST_CASE("EveryFieldOfAForcePlanIsEncoded") {
   CHECK(m.effort == plan.effort);
 }
 
+TEST_CASE("EveryFieldOfAnArmsMotionIsEncoded") {
+  Distinct distinct;
+  Arm3Motion motion;
+  motion.step = distinct.whole();
+  motion.time = distinct.real();
+  for (Vector3* vector : {&motion.theta, &motion.given_rate, &motion.calculated_rate, &motion.v, &motion.omega,
+                          &motion.dp, &motion.dphi}) {
+    *vector = distinct.vector();
+  }
+  for (double& entry : motion.map.reshaped()) entry = distinct.real();
+  for (double& entry : motion.jacobian.reshaped()) entry = distinct.real();
+  Message bytes;
+  encode(kHeader, motion, bytes);
+  const auto m = whole<stance_msgs::arm3_motion_t>(bytes);
+  check_header(m);
+  CHECK(m.step == motion.step);
+  CHECK(m.time == motion.time);
+  check_elements(motion.theta, m.theta);
+  check_elements(motion.given_rate, m.given_rate);
+  check_elements(motion.calculated_rate, m.calculated_rate);
+  check_elements(motion.v, m.v);
+  check_elements(motion.omega, m.omega);
+  check_elements(motion.dp, m.dp);
+  check_elements(motion.dphi, m.dphi);
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) CHECK(m.map_A3[row][column] == motion.map(row, column));
+  }
+  for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column < 3; ++column) CHECK(m.jacobian[row][column] == motion.jacobian(row, column));
+  }
+}
+
 TEST_CASE("EveryFieldOfATraceIsEncoded") {
   Distinct distinct;
   constexpr Consumed consumed{
@@ -446,12 +479,15 @@ TEST_CASE("EveryFieldOfATimingIsEncodedAndItsTimeIsTheTicksStart") {
   CHECK(m.dropped_states == timing.dropped_states);
 }
 
-TEST_CASE("TheTickOfACommandAndAPlanIsToldOnItsOwnChannelOnly") {
-  Message command, plan;
+TEST_CASE("TheTickOfAMessageIsToldOnItsOwnChannelOnly") {
+  Message command, plan, motion;
   encode(kHeader, JointCommand{}, command);
   encode(kHeader, ForcePlan{}, plan);
+  encode(kHeader, Arm3Motion{}, motion);
   CHECK(tick_of(channel::kJointCommand, command.bytes()) == kHeader.seq);
   CHECK(tick_of(channel::kForcePlan, plan.bytes()) == kHeader.seq);
+  CHECK(tick_of(channel::kArm3Motion, motion.bytes()) == kHeader.seq);
+  CHECK_FALSE(tick_of(channel::kArm3Motion, plan.bytes()).has_value());
   CHECK_FALSE(tick_of(channel::kForcePlan, command.bytes()).has_value());
   CHECK_FALSE(tick_of(channel::kJointCommand, plan.bytes()).has_value());
   CHECK_FALSE(tick_of(channel::kTrace, command.bytes()).has_value());

@@ -181,7 +181,7 @@ TEST_CASE("AUserCommandMustBeFiniteAndOfAKnownBehaviour") {
     command.height_offset = bad;
     CHECK_FALSE(command_is_plausible(command));
   }
-  for (const int unknown : {-128, -1, 5, 127}) {
+  for (const int unknown : {-128, -1, 6, 127}) {
     UserCommand command = good;
     command.behaviour = static_cast<Behaviour>(unknown);
     CHECK_FALSE(command_is_plausible(command));

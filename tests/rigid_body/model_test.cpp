@@ -118,6 +118,15 @@ TEST_CASE("FixedJointsMergeIntoTheirParents") {
   const auto feet = rigid_body::feet_from_urdf(fixed, model, {"hand"});
   CHECK(feet[0].body == 1);
   CHECK(max_difference(feet[0].tip, Vector3(0.0, 0.7, 0.0)) < kExact);
+  const rigid_body::LinkPose finger = rigid_body::link_pose_from_urdf(fixed, model, "finger");
+  CHECK(finger.body == 1);
+  CHECK(max_difference(finger.T_BL.p, Vector3(0.0, 0.0, 0.0)) < kExact);
+  CHECK(max_difference(finger.T_BL.R, math::exp_so3({0.5 * std::numbers::pi, 0.0, 0.0})) < kExact);
+  const rigid_body::LinkPose nail = rigid_body::link_pose_from_urdf(fixed, model, "nail");
+  CHECK(nail.body == 2);
+  CHECK(nail.T_BL.p.isZero());
+  CHECK_THROWS_MATCHES(rigid_body::link_pose_from_urdf(fixed, model, "thumb"), std::invalid_argument,
+                       MessageMatches(ContainsSubstring("link 'thumb'")));
 }
 
 TEST_CASE("CollisionShapesStandInTheirBodiesOrderAndFrame") {
