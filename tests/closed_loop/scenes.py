@@ -25,8 +25,10 @@ REAL_TIME_DURATION = 3.0  # s
 RUN_ID = 1  # stance-rollout's own
 
 
-def request(out: Path, realtime: bool, duration: float, scenario: str = "demo") -> RunRequest:
-    return RunRequest(out=out, scenario=scenario, realtime=realtime, duration=duration, seed=3, run_id=RUN_ID)
+def request(out: Path, realtime: bool, duration: float, scenario: str = "demo", robot: str = "biped") -> RunRequest:
+    return RunRequest(
+        out=out, robot=robot, scenario=scenario, realtime=realtime, duration=duration, seed=3, run_id=RUN_ID
+    )
 
 
 def lockstep(out: Path) -> dict[str, Any]:
@@ -40,6 +42,15 @@ def single_body(out: Path) -> dict[str, Any]:
 
 def walk(out: Path) -> dict[str, Any]:
     return {"fell": record(request(out, False, LOCKSTEP_DURATION, "walk_noisy")).fell}
+
+
+def arm(out: Path) -> dict[str, Any]:
+    """The 3-joint arm plays the document's motion."""
+    return {"fell": record(request(out, False, LOCKSTEP_DURATION, robot="arm3")).fell}
+
+
+def arm_in_real_time(out: Path) -> dict[str, Any]:
+    return {"fell": record(request(out, True, REAL_TIME_DURATION, robot="arm3")).fell}
 
 
 def lockstep_with_false_truth(out: Path) -> dict[str, Any]:
@@ -219,6 +230,8 @@ if __name__ == "__main__":
         "lockstep": lockstep,
         "single_body": single_body,
         "walk": walk,
+        "arm": arm,
+        "arm_in_real_time": arm_in_real_time,
         "lockstep_with_false_truth": lockstep_with_false_truth,
         "real_time": real_time,
         "two_runs": two_runs,

@@ -16,6 +16,7 @@ from stance.log import Log
 from stance.programs import find_program
 from stance.replay import verify
 from stance_msgs import (
+    arm3_motion_t,
     controller_trace_t,
     force_plan_t,
     joint_command_t,
@@ -26,8 +27,10 @@ from stance_msgs import (
 
 SCENES = Path(__file__).with_name("scenes.py")
 DECISIONS = ("JOINT_COMMAND", "FORCE_PLAN", "CONTROLLER_TRACE")
+ARMS_DECISIONS = ("JOINT_COMMAND", "ARM3_MOTION", "CONTROLLER_TRACE")
 PLANT = ("USER_COMMAND", "ROBOT_STATE", "TRUTH")
 TYPES = {
+    "ARM3_MOTION": arm3_motion_t,
     "JOINT_COMMAND": joint_command_t,
     "FORCE_PLAN": force_plan_t,
     "CONTROLLER_TRACE": controller_trace_t,
@@ -97,15 +100,15 @@ def rollout(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return roll_out("demo", tmp_path_factory.mktemp("rollout"))
 
 
-def roll_out(scenario: str, out: Path) -> Path:
+def roll_out(scenario: str, out: Path, robot: str = "biped") -> Path:
     log = out / "run.lcmlog"
-    words = ["--robot", "biped", "--scenario", scenario, "--duration", "9", "--seed", "3", "--log", str(log)]
+    words = ["--robot", robot, "--scenario", scenario, "--duration", "9", "--seed", "3", "--log", str(log)]
     subprocess.run([str(find_program("stance-rollout")), *words], check=True, capture_output=True)
     return log
 
 
-def assert_same_decisions(first: Path, second: Path) -> None:
-    for channel in DECISIONS:
+def assert_same_decisions(first: Path, second: Path, channels: tuple[str, ...] = DECISIONS) -> None:
+    for channel in channels:
         one, other = payloads(first, channel, 900), payloads(second, channel, 900)
         assert len(one) == len(other) == 900, channel
         assert one == other, channel
@@ -122,6 +125,31 @@ def test_a_walk_in_lockstep_over_lcm_equals_the_rollout_byte_for_byte(tmp_path: 
     run = Log.open(log).run()
     assert run.field("CONTROLLER_TRACE", "steps").max() > 20
     assert run.field("TRUTH", "p_WB")[-1, 0] > 2.5  # m, forward
+
+
+def test_an_arm_in_lockstep_over_lcm_equals_the_rollout_byte_for_byte_and_replays(tmp_path: Path) -> None:
+    result, log = play_whole("arm", tmp_path, (*ARMS_DECISIONS, *PLANT))
+    assert result["fell"] is False
+    rolled = roll_out("demo", tmp_path, "arm3")
+    assert_same_decisions(log, rolled, ARMS_DECISIONS)
+    for channel in PLANT:
+        assert payloads(log, channel, 1000) == payloads(rolled, channel, 1000), channel
+    run = Log.open(log).run()
+    assert "FORCE_PLAN" not in run
+    assert run.field("ARM3_MOTION", "step").max() == 800
+    verified = verify(log, capture=True)
+    assert verified.returncode == 0, verified.stdout
+    assert "900 of 900 ticks replayed, 2700 messages compared, 0 differ" in verified.stdout
+
+
+def test_an_arm_in_real_time_plays_its_motion_and_replays(tmp_path: Path) -> None:
+    play("arm_in_real_time", tmp_path / "run")
+    log = tmp_path / "run/run.lcmlog"
+    run = Log.open(log).run()
+    assert run.field("ARM3_MOTION", "step").max() > 100
+    assert run.field("ARM3_MOTION", "given_rate").max() > 0.0
+    verified = verify(log, capture=True)
+    assert verified.returncode == 0, verified.stdout
 
 
 def test_the_rollouts_log_holds_what_lockstep_over_lcm_says_in_its_order(lockstep: Path, rollout: Path) -> None:

@@ -24,18 +24,28 @@ COMMENT = re.compile(r"(?s:<!--.*?-->|\"\"\".*?\"\"\")|//.*|#.*")
 SIGNIFICANT = 3  # digits that make a number the robot's own, not a half, a tolerance or a count
 
 
+def described(robot: str) -> dict[str, Any]:
+    """As the controller reads it."""
+    words = [str(find_program("stance-controller")), "--robot", robot, "--describe"]
+    found: dict[str, Any] = json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)
+    return found
+
+
+def read(robot: str) -> Robot:
+    """As Python does."""
+    directory = SOURCE_TREE / "robots" / robot
+    joints = yaml.safe_load((directory / f"{robot}.yaml").read_text())["joints"]
+    return parse_urdf((directory / f"{robot}.urdf").read_text(), tuple(joints))
+
+
 @pytest.fixture(scope="module")
 def controller() -> dict[str, Any]:
-    words = [str(find_program("stance-controller")), "--robot", "biped", "--describe"]
-    described: dict[str, Any] = json.loads(subprocess.run(words, check=True, capture_output=True, text=True).stdout)
-    return described
+    return described("biped")
 
 
 @pytest.fixture(scope="module")
 def python() -> Robot:
-    directory = SOURCE_TREE / "robots/biped"
-    joints = yaml.safe_load((directory / "biped.yaml").read_text())["joints"]
-    return parse_urdf((directory / "biped.urdf").read_text(), tuple(joints))
+    return read("biped")
 
 
 @pytest.fixture(scope="module")
@@ -63,6 +73,16 @@ def test_joints_have_the_same_order_and_limits(controller: dict[str, Any], pytho
         assert (told["max_velocity"], told["max_torque"]) == (read.velocity, read.effort)
     nominal = [joint["nominal"] for joint in controller["joints"]]
     assert standing.field("TRUTH", "joint_position")[0, : len(nominal)] == pytest.approx(nominal, abs=0.02)
+
+
+def test_the_arms_mass_and_joints_are_the_same_and_it_has_no_feet() -> None:
+    told, arm = described("arm3"), read("arm3")
+    assert told["total_mass"] == pytest.approx(arm.mass, abs=EXACT)
+    assert told["feet"] == []
+    assert [joint["name"] for joint in told["joints"]] == [joint.name for joint in arm.moving]
+    for one, other in zip(told["joints"], arm.moving, strict=True):
+        assert (one["lower"], one["upper"]) == (other.lower, other.upper)
+        assert (one["max_velocity"], one["max_torque"]) == (other.velocity, other.effort)
 
 
 def test_feet_are_at_the_same_place(controller: dict[str, Any], python: Robot, standing: Run) -> None:
@@ -117,10 +137,10 @@ def numbers(text: str) -> set[float]:
 
 def test_no_mass_length_limit_or_gain_is_repeated_outside_robots() -> None:
     """The robot's own numbers stand in robots/ alone: not in the sources of controller, simulator or analysis."""
-    robot = {
-        n for name in ("biped.urdf", "biped.yaml") for n in numbers((SOURCE_TREE / "robots/biped" / name).read_text())
-    }
+    files = [file for file in (SOURCE_TREE / "robots").rglob("*") if file.suffix in (".urdf", ".yaml")]
+    robot = {number for file in files for number in numbers(file.read_text())}
     assert {0.0813333333, 1.441123, 0.505} <= robot  # an inertia, a joint's position, a reach
+    assert {0.50375, 0.031484375} <= robot  # the 3-joint arm's inertias
     for folder in ("controller", "sim", "rollout", "analysis/stance"):
         for path in sorted(Path(SOURCE_TREE, folder).rglob("*")):
             if path.suffix in (".cpp", ".hpp", ".py"):
