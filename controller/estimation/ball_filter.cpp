@@ -50,11 +50,8 @@ void BallFilterConfig::validate() const {
 template <int n>
 BallFilter<n>::BallFilter(const BallFilterConfig& config) : config_(config) {
   config.validate();
-  const Require require{"ball."};
   if (n == 6) {
-    require(config.drag_sigma == 0.0, "drag_sigma", config.drag_sigma, "0 where the drag is not estimated");
-  } else {
-    require(config.drag_sigma > 0.0, "drag_sigma", config.drag_sigma, "above 0 1/m where the drag is estimated");
+    Require{"ball."}(config.drag_sigma == 0.0, "drag_sigma", config.drag_sigma, "0 where the drag is not estimated");
   }
   reset();
 }
@@ -84,9 +81,24 @@ double BallFilter<n>::step(double dt, const std::optional<Vector3>& z) noexcept 
   }
   advance(filter_, dt);
   if (!z) return kNothing;
+  return filter_.update(*z, position(), variance * Matrix3::Identity()).nis / 3.0;
+}
+
+template <int n>
+double BallFilter<n>::nis(double dt, const Vector3& z) const noexcept {
+  if (!started_) return std::numeric_limits<double>::quiet_NaN();
+  Filter filter = filter_;
+  advance(filter, dt);
+  const double variance = config_.measurement_sigma * config_.measurement_sigma;
+  return filter.innovation(z, position(), variance * Matrix3::Identity()).nis / 3.0;
+}
+
+/// H
+template <int n>
+typename BallFilter<n>::Filter::MeasurementMatrix BallFilter<n>::position() noexcept {
   typename Filter::MeasurementMatrix H = Filter::MeasurementMatrix::Zero();
   H.template leftCols<3>().setIdentity();
-  return filter_.update(*z, H, variance * Matrix3::Identity()).nis / 3.0;
+  return H;
 }
 
 template <int n>

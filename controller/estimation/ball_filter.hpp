@@ -3,7 +3,8 @@
 //
 //   pd = v     vd = g - k |v| v + w     kd = 0     z = p + r,  r ~ N(0, sigma^2 1),  w white of density q
 //
-// State (p, v) where the drag k is known (0: ballistic), (p, v, k) where it is estimated too. One step h by the
+// State (p, v) where the drag k is known (0: ballistic), (p, v, k) where it is estimated too; with drag_sigma = 0 the
+// latter knows it as well, and is the former. One step h by the
 // midpoint rule, exact without drag, and F its derivative:
 //   v_m = v + h/2 a(v)     p+ = p + h v_m     v+ = v + h a(v_m),     a(v) = g - k |v| v
 //   Q = q [h^3/3 1, h^2/2 1; h^2/2 1, h 1]
@@ -23,7 +24,7 @@ struct BallFilterConfig {
   Vector3 velocity = Vector3::Zero();       ///< m/s, expected at the first observation
   Vector3 gravity = {0.0, 0.0, -kGravity};  ///< m/s^2, in the frame of the observations
   double drag = 0.0;                        ///< 1/m, k; with estimated drag its mean at the start
-  double drag_sigma = 0.0;                  ///< 1/m, of estimated drag at the start; else 0
+  double drag_sigma = 0.0;                  ///< 1/m, of estimated drag at the start; 0 where it is known
   void validate() const;                    ///< throws std::invalid_argument naming the field, its value and the range
 };
 
@@ -45,13 +46,16 @@ class BallFilter {
     Vector3 v() const noexcept { return x.template segment<3>(3); }
   };
 
-  /// Throws what config.validate() throws; std::invalid_argument, too, where drag_sigma does not fit n.
+  /// Throws what config.validate() throws; std::invalid_argument, too, where n = 6 and drag_sigma is not 0.
   explicit BallFilter(const BallFilterConfig& config);
 
   /// A camera frame a time `dt` (s, >= 0) after the last one; `z` [m], if the ball was seen. The first ball seen starts
   /// the filter. Returns the innovation's chi^2 over its 3 degrees of freedom (1 in the mean, where the model holds);
   /// NaN where nothing was compared: no ball, the first one, or a z that is no number.
   double step(double dt, const std::optional<Vector3>& z) noexcept;
+
+  /// What step(dt, z) would return, for gates.
+  double nis(double dt, const Vector3& z) const noexcept;
 
   bool has_started() const noexcept { return started_; }
 
@@ -66,6 +70,7 @@ class BallFilter {
 
  private:
   using Filter = KalmanFilter<n, 3>;
+  static typename Filter::MeasurementMatrix position() noexcept;
   void advance(Filter& filter, double dt) const noexcept;
 
   BallFilterConfig config_;

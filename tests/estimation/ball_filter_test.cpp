@@ -256,7 +256,23 @@ TEST_CASE("BallFilterConfigNamesWhatIsWrong") {
   CHECK(message([](auto& c) { c.velocity_sigma = -1.0; }).find("velocity_sigma") != std::string::npos);
   CHECK(message([](auto& c) { c.drag_sigma = 0.1; }).find("drag_sigma") != std::string::npos);
   CHECK(message([](auto& c) { c.gravity.y() = NAN; }).find("gravity") != std::string::npos);
-  CHECK_THROWS_AS(BallFilter<7>(tuned()), std::invalid_argument);
+}
+
+TEST_CASE("SevenStatesWithADragThatIsKnownAreTheSixStatesFilter") {
+  BallFilterConfig config = tuned();
+  config.drag = 0.02;
+  BallFilter<6> six(config);
+  BallFilter<7> seven(config);
+  for (int k = 0; k < 30; ++k) {
+    const Vector3 z(3.0 - 0.05 * k + 0.01 * std::sin(7.0 * k), 0.01 * std::cos(5.0 * k), 1.0 + 0.02 * k);
+    if (k > 0) CHECK(std::abs(seven.nis(0.01, z) - six.nis(0.01, z)) < 1e-9);
+    const double foreseen = six.nis(0.01, z), nis = six.step(0.01, z);
+    CHECK((std::isnan(nis) || nis == foreseen));
+    static_cast<void>(seven.step(0.01, z));
+    CHECK((seven.estimate().x.head<6>() - six.estimate().x).norm() < 1e-12);
+    CHECK((seven.estimate().P.topLeftCorner<6, 6>() - six.estimate().P).norm() < 1e-12);
+    CHECK(seven.estimate().x(6) == config.drag);
+  }
 }
 
 }  // namespace stance::estimation
