@@ -1,0 +1,100 @@
+#pragma once
+// Where and when an arm of document 001 meets a ball: decided anew each tick, over candidates (time x pitch x solution
+// of the inverse kinematics). Frame A is the arm's base. Nothing here allocates or throws.
+//
+// The ball coasts,  pd = v,  vd = g - k |v| v.  At a time t the cup may meet it at p(t) with its axis against the
+// ball's velocity: in the arm's vertical plane through p, v_r along the plane's horizontal,
+//   pitch = atan2(-v_r, v_z) + offset,  roll 0,       so that for offset 0 the axis is -(v_r, v_z) / |(v_r, v_z)|;
+// from an arm that reaches over its own back the same axis is at the negative pitch. Of all that it costs least,
+//   motion    max_i |q_i - q_now_i| / speed_i                         [s]
+//   facing    offset^2
+//   lateness  what is missing of `spare_time` between the time needed and the time left
+//   reach     by how much the cup stays short of a ball barely out of reach: the wrist's circle about the shoulder is
+//             closed by up to `reach_slack`
+//   change    of the plan of the tick before, in time and in posture
+// is the plan. From `commit` before the meeting on, its time and its offset stay; the posture follows the estimate.
+#include <array>
+#include <cstdint>
+
+#include "controller/kinematics/arm5.hpp"
+#include "controller/planning/joint_motion.hpp"
+
+namespace stance::planning {
+
+inline constexpr int kPitchOffsets = 5;
+
+struct InterceptionConfig {
+  double earliest = 0.0;                              ///< s ahead
+  double latest = 0.0;                                ///< s ahead
+  double step = 0.0;                                  ///< s between candidates
+  std::array<double, kPitchOffsets> pitch_offsets{};  ///< rad, of the cup's axis from the ball's velocity
+  double min_height = 0.0;                            ///< m, of the cup over A's origin
+  double limit_margin = 0.0;                          ///< rad, that a plan keeps from the joints' limits
+  double reach_slack = 0.0;                           ///< m
+  double commit = 0.0;                                ///< s
+  double spare_time = 0.0;                            ///< s
+  double facing_cost = 0.0;                           ///< 1/rad^2
+  double lateness_cost = 0.0;                         ///< 1/s
+  double reach_cost = 0.0;                            ///< 1/m
+  double time_change_cost = 0.0;                      ///< 1/s
+  double posture_change_cost = 0.0;                   ///< 1/s, of the motion from the last plan's posture to this one's
+
+  /// Throws std::invalid_argument naming the field, its value and the range.
+  void validate() const;
+};
+
+/// A ball in flight.
+struct BallState {
+  Vector3 p_A = Vector3::Zero();  ///< m
+  Vector3 v_A = Vector3::Zero();  ///< m/s
+  double drag = 0.0;              ///< 1/m, k
+  /// A time `dt` (s, >= 0) on, by the midpoint rule.
+  void coast(double dt) noexcept;
+};
+
+enum class InterceptionStatus : std::uint8_t {
+  kPlanned,
+  kTime,   ///< the arm gets there late; it goes all the same
+  kReach,  ///< there is no posture that meets the ball
+};
+
+struct InterceptionPlan {
+  InterceptionStatus status = InterceptionStatus::kReach;
+  double time = 0.0;                    ///< s, of the caller's clock
+  Vector3 p_ABall = Vector3::Zero();    ///< m, where the ball will be
+  double offset = 0.0;                  ///< rad, of the pitch
+  JointVector q = JointVector::Zero();  ///< rad, the posture that meets it
+  double slack = 0.0;                   ///< s, left less needed
+  bool committed = false;
+
+  bool exists() const noexcept { return status != InterceptionStatus::kReach; }
+};
+
+class Interception {
+ public:
+  /// Throws std::invalid_argument: config.validate()'s, or limits that leave nothing within the margin.
+  Interception(const InterceptionConfig& config, const kinematics::Arm5Geometry& arm,
+               const kinematics::Arm5Limits& limits, const JointMotionLimits& motion_limits);
+
+  /// Plans for the ball that is in `ball` at `now` [s], for an arm in `motion`.
+  const InterceptionPlan& update(double now, const BallState& ball, const JointMotion& motion) noexcept;
+  const InterceptionPlan& plan() const noexcept { return plan_; }
+  /// The next ball is another one.
+  void reset() noexcept { plan_ = InterceptionPlan{}; }
+
+ private:
+  void follow(double now, const BallState& ball, const JointMotion& motion) noexcept;
+  /// Calls `take(q, short_of)` for each posture with the cup at `ball`'s place, its axis at `offset`.
+  template <typename Take>
+  void postures(const BallState& ball, double offset, const Take& take) const noexcept;
+  double short_of_reach(const Vector3& p_A, double bearing, double pitch, Vector3& p_reached) const noexcept;
+
+  InterceptionConfig config_;
+  kinematics::Arm5Geometry arm_;
+  kinematics::Arm5Limits limits_;
+  JointMotionLimits motion_limits_;
+  double farthest_ = 0.0;  ///< m, of the cup from the shoulder's axis
+  InterceptionPlan plan_;
+};
+
+}  // namespace stance::planning

@@ -1,0 +1,84 @@
+#include "controller/planning/joint_motion.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+namespace stance::planning {
+namespace {
+
+constexpr double kLeastTime = 0.02;  ///< s: a quintic over less is all rounding
+
+/// One joint's quintic, from (q, v, a) to (target, 0, 0) in T.
+struct Quintic {
+  double q, v, a, c3, c4, c5;
+
+  Quintic(double q_0, double v_0, double a_0, double target, double T) noexcept : q(q_0), v(v_0), a(a_0) {
+    const double d = target - q - v * T - 0.5 * a * T * T, dv = -v - a * T, da = -a;
+    c3 = (10.0 * d - 4.0 * dv * T + 0.5 * da * T * T) / (T * T * T);
+    c4 = (-15.0 * d + 7.0 * dv * T - da * T * T) / (T * T * T * T);
+    c5 = (6.0 * d - 3.0 * dv * T + 0.5 * da * T * T) / (T * T * T * T * T);
+  }
+  double position(double t) const noexcept { return q + t * (v + t * (0.5 * a + t * (c3 + t * (c4 + t * c5)))); }
+  double speed(double t) const noexcept { return v + t * (a + t * (3.0 * c3 + t * (4.0 * c4 + t * 5.0 * c5))); }
+  double acceleration(double t) const noexcept { return a + t * (6.0 * c3 + t * (12.0 * c4 + t * 20.0 * c5)); }
+
+  /// Does it keep to the limits from its first tenth to its end? What it has at the start it cannot help.
+  bool keeps_to(double max_speed, double max_acceleration, double T) const noexcept {
+    constexpr int samples = 12;
+    constexpr double rounding = 1.0 + 1e-9;
+    for (int i = 1; i < samples; ++i) {
+      const double t = T * (0.1 + 0.9 * i / samples);
+      if (!(std::abs(speed(t)) <= max_speed * rounding && std::abs(acceleration(t)) <= max_acceleration * rounding)) {
+        return false;
+      }
+    }
+    return true;
+  }
+};
+
+/// The speed to have after dt on the fastest way to rest at a distance `e`.
+double braking_speed(double e, double max_speed, double max_acceleration, double dt) noexcept {
+  constexpr double share = 0.75;  // of the acceleration: the rest is for steps of dt
+  const double speed = std::min({max_speed, std::sqrt(2.0 * share * max_acceleration * std::abs(e)),
+                                 0.5 * std::abs(e) / dt});  // the last: no more than half the way in a step
+  return std::copysign(speed, e);
+}
+
+}  // namespace
+
+void advance(const JointMotionLimits& limits, int joints, const JointVector& target, double time_left, double dt,
+             JointMotion& motion) noexcept {
+  for (int i = 0; i < joints; ++i) {
+    double &q = motion.q[i], &v = motion.v[i], &a = motion.a[i];
+    const double max_speed = limits.speed[i], max_acceleration = limits.acceleration[i];
+    const double T = std::max(time_left, kLeastTime);
+    const Quintic way(q, v, a, target[i], T);
+    if (way.keeps_to(max_speed, max_acceleration, T)) {
+      // Past its end a quintic goes anywhere.
+      const bool ends = dt >= T;
+      q = ends ? target[i] : way.position(dt);
+      v = ends ? 0.0 : way.speed(dt);
+      a = ends ? 0.0 : way.acceleration(dt);
+      continue;
+    }
+    const double wanted = braking_speed(target[i] - q - 0.5 * v * dt, max_speed, max_acceleration, dt);
+    a = std::clamp((wanted - v) / dt, -max_acceleration, max_acceleration);
+    q += v * dt + 0.5 * a * dt * dt;
+    v += a * dt;
+  }
+}
+
+double time_needed(const JointMotionLimits& limits, int joints, const JointMotion& motion,
+                   const JointVector& target) noexcept {
+  constexpr double head_start = 0.12;  // s, for which a joint's present speed helps or hinders it
+  constexpr double peak_speed = 15.0 / 8.0, peak_acceleration = 5.7735026918962582;
+  double needed = 0.0;
+  for (int i = 0; i < joints; ++i) {
+    const double d = std::abs(target[i] - motion.q[i] - head_start * motion.v[i]);
+    needed =
+        std::max({needed, peak_speed * d / limits.speed[i], std::sqrt(peak_acceleration * d / limits.acceleration[i])});
+  }
+  return needed;
+}
+
+}  // namespace stance::planning
