@@ -11,8 +11,9 @@ namespace stance {
 
 inline constexpr int kMaxJoints = 8;
 inline constexpr int kMaxContacts = 4;
-inline constexpr int kStateSamples = 2;         ///< sensor samples in one RobotState
-inline constexpr int kMaxPlanStages = 32;       ///< published stages of a force plan
+inline constexpr int kStateSamples = 2;    ///< sensor samples in one RobotState
+inline constexpr int kMaxPlanStages = 32;  ///< published stages of a force plan
+inline constexpr int kMaxCalibrationPoints = 64;
 inline constexpr double kControlPeriod = 0.01;  ///< s, dt of the loop and of the centroidal model
 
 using JointVector = Eigen::Matrix<double, kMaxJoints, 1>;  ///< entries past num_joints are zero
@@ -62,6 +63,30 @@ struct UserCommand {
   Eigen::Vector2d velocity = Eigen::Vector2d::Zero();  ///< m/s, in H
   double yaw_rate = 0.0;                               ///< rad/s
   double height_offset = 0.0;                          ///< m
+};
+
+/// A ball as the camera sees it.
+struct BallObservation {
+  std::int64_t utime = 0;  ///< us, of the exposure
+  std::int64_t seq = 0;
+  std::int64_t run_id = 0;
+  bool valid = false;             ///< the camera saw a ball
+  Vector3 p_K = Vector3::Zero();  ///< m, its centre in the camera frame K
+};
+
+/// Pairs of points that calibrate the camera against the arm's base A.
+struct CalibrationPoints {
+  std::int64_t utime = 0;
+  std::int64_t seq = 0;
+  std::int64_t run_id = 0;
+  int num_points = 0;
+  std::array<Vector3, kMaxCalibrationPoints> p_K;  ///< m
+  std::array<Vector3, kMaxCalibrationPoints> p_A;  ///< m
+
+  CalibrationPoints() {
+    p_K.fill(Vector3::Zero());
+    p_A.fill(Vector3::Zero());
+  }
 };
 
 enum class DriveMode : std::int8_t { kActive = 0, kDamp = 1, kStop = 2 };
@@ -192,13 +217,59 @@ struct Arm3Motion {
       Eigen::Matrix<double, 6, 3>::Zero();  ///< (v, omega) = J thetad at this instant
 };
 
+/// The ball as the filter has it, in the arm's base frame A.
+struct BallEstimate {
+  bool updated = false;    ///< an observation came in this tick: only then it is published
+  std::int64_t utime = 0;  ///< us, of the observation
+  std::int64_t observation_seq = 0;
+  Vector3 p_A = Vector3::Zero();                                                 ///< m
+  Vector3 v_A = Vector3::Zero();                                                 ///< m/s
+  Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();  ///< of (p, v)
+  double nis = 0.0;  ///< of the observation, per degree of freedom; NaN where nothing was compared
+};
+
+enum class CatchPhase : std::int8_t { kUncalibrated = 0, kWaiting = 1, kCatching = 2, kHolding = 3, kReturning = 4 };
+enum class CatchStatus : std::int8_t { kNone = 0, kPlanned = 1, kTime = 2, kReach = 3 };
+enum class CalibrationState : std::int8_t {
+  kNone = 0,
+  kCalibrated = 1,
+  kUnequal = 2,
+  kTooFew = 3,
+  kTooMany = 4,
+  kNotFinite = 5,
+  kDegenerate = 6,
+  kTooRough = 7,
+};
+
+/// What the catcher means to do about the ball, in the arm's base frame A.
+struct CatchPlan {
+  CatchPhase phase = CatchPhase::kUncalibrated;
+  CalibrationState calibration = CalibrationState::kNone;
+  double calibration_rms = 0.0;  ///< m, of the last points
+  CatchStatus status = CatchStatus::kNone;
+  bool committed = false;
+  std::int64_t catch_utime = 0;             ///< us, when ball and cup meet
+  Vector3 p_ABall = Vector3::Zero();        ///< m, where the ball will be then
+  Vector3 p_ACup = Vector3::Zero();         ///< m, where the cup's centre will be
+  Vector3 axis_ACup = Vector3::Zero();      ///< the cup's axis then
+  JointVector q = JointVector::Zero();      ///< rad
+  double slack = 0.0;                       ///< s, left less needed
+  JointVector q_ref = JointVector::Zero();  ///< rad, the joints' reference for this tick's command
+  JointVector v_ref = JointVector::Zero();  ///< rad/s
+  std::int64_t observations = 0;            ///< of this ball, believed
+  std::int64_t rejected = 0;                ///< of the run, not believed
+};
+
 /// What a tick is given. Everything that a decision may depend on is here, so that a log of it replays bit for bit.
 struct TickInput {
-  RobotState state;            ///< the newest, as it came: not yet validated
-  bool state_is_new = false;   ///< not given to an earlier tick
-  int periods = 1;             ///< control periods since the last tick: more than 1 after a miss
-  UserCommand user_command;    ///< the newest, as it came; seq 0 before the first
-  bool operator_stop = false;  ///< a stop_t has arrived in this run
+  RobotState state;               ///< the newest, as it came: not yet validated
+  bool state_is_new = false;      ///< not given to an earlier tick
+  int periods = 1;                ///< control periods since the last tick: more than 1 after a miss
+  UserCommand user_command;       ///< the newest, as it came; seq 0 before the first
+  bool operator_stop = false;     ///< a stop_t has arrived in this run
+  BallObservation ball;           ///< the newest, as it came; seq 0 before the first
+  bool ball_is_new = false;       ///< not given to an earlier tick
+  CalibrationPoints calibration;  ///< the newest, as they came; seq 0 before the first
 };
 
 /// Each robot fills what it publishes (loop::Controller), and the command and the trace.
@@ -206,6 +277,8 @@ struct TickOutput {
   JointCommand command;
   ForcePlan plan;
   Arm3Motion arm3_motion;
+  BallEstimate ball;
+  CatchPlan catching;
   Trace trace;
 };
 
