@@ -1,0 +1,62 @@
+#include "controller/behaviours/ball_track.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+namespace stance::behaviours {
+namespace {
+
+double seconds(std::int64_t from_us, std::int64_t to_us) noexcept {
+  return static_cast<double>(to_us - from_us) * 1e-6;
+}
+
+}  // namespace
+
+BallTrack::BallTrack(const BallTrackConfig& config, const estimation::BallFilterConfig& filter)
+    : config_(config), filter_(filter) {}
+
+void BallTrack::reset() noexcept {
+  filter_.reset();
+  observations_ = 0;
+  rejected_in_a_row_ = 0;
+}
+
+void BallTrack::start(std::int64_t utime, const Vector3& p_A) noexcept {
+  reset();
+  static_cast<void>(filter_.step(0.0, p_A));
+  utime_ = believed_utime_ = utime;
+  observations_ = 1;
+}
+
+double BallTrack::observe(std::int64_t utime, const Vector3& p_A) noexcept {
+  if (!filter_.has_started() || seconds(believed_utime_, utime) > config_.max_gap) {
+    start(utime, p_A);
+    return std::numeric_limits<double>::quiet_NaN();
+  }
+  const double dt = seconds(utime_, utime);
+  const double nis = filter_.nis(dt, p_A);
+  utime_ = utime;
+  if (nis <= config_.gate) {
+    static_cast<void>(filter_.step(dt, p_A));
+    believed_utime_ = utime;
+    ++observations_;
+    rejected_in_a_row_ = 0;
+    return nis;
+  }
+  static_cast<void>(filter_.step(dt, std::nullopt));
+  ++rejected_;
+  if (++rejected_in_a_row_ >= config_.max_rejected) start(utime, p_A);
+  return nis;
+}
+
+bool BallTrack::is_known(std::int64_t utime) const noexcept {
+  return filter_.has_started() && observations_ >= config_.min_observations &&
+         seconds(believed_utime_, utime) <= config_.max_gap;
+}
+
+estimation::BallFilter<7>::Estimate BallTrack::at(std::int64_t utime) const noexcept {
+  return filter_.predict(std::max(seconds(utime_, utime), 0.0));
+}
+
+}  // namespace stance::behaviours

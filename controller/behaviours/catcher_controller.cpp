@@ -1,0 +1,321 @@
+#include "controller/behaviours/catcher_controller.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <span>
+
+#include "controller/calibration/calibration.hpp"
+#include "controller/rigid_body/chain_dynamics.hpp"
+
+namespace stance::behaviours {
+namespace {
+
+using calibration::Status;
+using planning::InterceptionPlan;
+using planning::InterceptionStatus;
+
+static_assert(kMaxCalibrationPoints == calibration::kMaxPoints);
+
+double seconds(std::int64_t from_us, std::int64_t to_us) noexcept {
+  return (static_cast<double>(to_us) - static_cast<double>(from_us)) * 1e-6;
+}
+
+CalibrationState state_of(Status status) noexcept {
+  switch (status) {
+    case Status::kOk:
+      return CalibrationState::kCalibrated;
+    case Status::kUnequal:
+      return CalibrationState::kUnequal;
+    case Status::kTooFew:
+      return CalibrationState::kTooFew;
+    case Status::kTooMany:
+      return CalibrationState::kTooMany;
+    case Status::kNotFinite:
+      return CalibrationState::kNotFinite;
+    case Status::kDegenerate:
+      break;
+  }
+  return CalibrationState::kDegenerate;
+}
+
+CatchStatus status_of(InterceptionStatus status) noexcept {
+  switch (status) {
+    case InterceptionStatus::kPlanned:
+      return CatchStatus::kPlanned;
+    case InterceptionStatus::kTime:
+      return CatchStatus::kTime;
+    case InterceptionStatus::kReach:
+      break;
+  }
+  return CatchStatus::kReach;
+}
+
+}  // namespace
+
+CatcherController::CatcherController(const CatcherConfig& config, const rigid_body::Model& model)
+    : config_(config),
+      model_(model),
+      tree_(rigid_body::screw_tree(model)),
+      arm_(kinematics::arm5_geometry(model, config.tool)),
+      ladder_(config.fault_ladder),
+      track_(config.track, config.filter),
+      interception_(config.planner, arm_, kinematics::arm5_limits(model), config.motion) {
+  config_.validate();
+  start_run(0);
+}
+
+void CatcherController::start_run(std::int64_t run_id) noexcept {
+  memory_ = Memory{};
+  memory_.run_id = run_id;
+  give_up(SafetyMode::kDamp, memory_.last);
+  ladder_ = safety::FaultLadder(config_.fault_ladder);
+  track_ = BallTrack(config_.track, config_.filter);
+  interception_.reset();
+}
+
+void CatcherController::step(const TickInput& input, StageClock& clock, TickOutput& out) noexcept {
+  const std::int64_t before = memory_.state_utime;
+  const bool fresh = accept(input);
+  clock.stamp(Stage::kValidate);
+
+  out = memory_.last;
+  Trace& trace = out.trace;
+  trace.torques_clipped = 0;
+  out.ball.updated = false;
+  calibrate(input.calibration, out.catching);
+  observe(input, out.ball, out.catching);
+  clock.stamp(Stage::kEstimate);
+  if (fresh) {
+    const double dt = memory_.moving ? std::min(seconds(before, input.state.utime), 0.1) : 0.0;
+    plan(input.state, dt, out.catching);
+    move(input.state, dt, out.catching);
+    clock.stamp(Stage::kPlan);
+    out.command = JointCommand{};
+    out.command.num_joints = model_.num_joints;
+    out.command.mode = DriveMode::kActive;
+    planning::JointMotion reference = memory_.motion;
+    reference.q += config_.computed_torque.lead * (reference.v + 0.5 * config_.computed_torque.lead * reference.a);
+    reference.v += config_.computed_torque.lead * reference.a;
+    computed_torque(reference, out.command);
+    trace.torques_clipped = safety::limit_torques(model_, out.command);
+    if (trace.torques_clipped > 0) ladder_.report(Fault::kTorqueSaturated);
+    clock.stamp(Stage::kTorque);
+    if (safety::joint_outside_limits(model_, input.state.now().joint_position)) ladder_.report(Fault::kJointLimit);
+  }
+  const SafetyMode mode = ladder_.step(input.periods, out.command.mode == DriveMode::kActive);
+  if (mode == SafetyMode::kDamp || mode == SafetyMode::kStop) give_up(mode, out);
+  trace.safety = mode;
+  trace.faults = ladder_.faults();
+  trace.fault_count = ladder_.counts();
+  trace.behaviour = memory_.user_command.behaviour;
+  memory_.last = out;
+  clock.stamp(Stage::kSafety);
+}
+
+bool CatcherController::accept(const TickInput& input) noexcept {
+  const RobotState& state = input.state;
+  if (starts_run(memory_.run_id, memory_.state_seq, state)) start_run(state.run_id);
+  if (input.operator_stop) ladder_.report(Fault::kOperatorStop);
+
+  take_command(input);
+  if (!input.state_is_new) {
+    ladder_.report(Fault::kStateStale);
+    return false;
+  }
+  if (!follows(state) || !safety::state_is_plausible(config_.validation, model_, 0, state)) {
+    ladder_.report(Fault::kStateInvalid);
+    return false;
+  }
+  memory_.state_seq = state.seq;
+  memory_.state_utime = state.utime;
+  return true;
+}
+
+void CatcherController::take_command(const TickInput& input) noexcept {
+  const UserCommand& command = input.user_command;
+  UserCommand& taken = memory_.user_command;
+  memory_.user_command_age += input.periods;
+  if (command.seq != taken.seq) {
+    const bool offered = command.behaviour == Behaviour::kStand || command.behaviour == Behaviour::kCatch;
+    if (safety::command_is_plausible(command) && offered) {
+      taken = command;
+      memory_.user_command_age = 0;
+    } else {
+      taken.seq = command.seq;
+      ladder_.report(Fault::kCommandInvalid);
+    }
+  }
+  if (kControlPeriod * static_cast<double>(memory_.user_command_age) > config_.user_command_timeout) {
+    taken.behaviour = Behaviour::kStand;
+  }
+}
+
+bool CatcherController::follows(const RobotState& state) const noexcept {
+  if (state.seq <= memory_.state_seq || state.utime <= memory_.state_utime) return false;
+  if (memory_.state_seq == 0) return true;
+  // A number or a stamp far off would make every later state one out of order.
+  constexpr double period_us = kControlPeriod * 1e6;
+  const double periods = static_cast<double>(state.seq) - static_cast<double>(memory_.state_seq);
+  const double elapsed_us = static_cast<double>(state.utime) - static_cast<double>(memory_.state_utime);
+  return std::abs(elapsed_us - periods * period_us) < 0.5 * period_us;
+}
+
+void CatcherController::calibrate(const CalibrationPoints& points, CatchPlan& plan) noexcept {
+  if (points.seq == memory_.calibration_seq || points.run_id != memory_.run_id) return;
+  memory_.calibration_seq = points.seq;
+  const auto count = static_cast<std::size_t>(std::clamp(points.num_points, 0, kMaxCalibrationPoints));
+  const auto fit = calibration::calibrate(calibration::Kind::kRigid, std::span(points.p_K).first(count),
+                                          std::span(points.p_A).first(count));
+  plan.calibration = points.num_points > kMaxCalibrationPoints ? CalibrationState::kTooMany : state_of(fit.status);
+  plan.calibration_rms = fit.rms;
+  if (plan.calibration == CalibrationState::kCalibrated && !(fit.rms <= config_.max_calibration_rms)) {
+    plan.calibration = CalibrationState::kTooRough;
+  }
+  if (plan.calibration != CalibrationState::kCalibrated) return;
+  memory_.T_AK = {fit.T.leftCols<3>(), fit.T.col(3)};
+  if (plan.phase == CatchPhase::kUncalibrated) enter(CatchPhase::kWaiting, plan);
+}
+
+void CatcherController::observe(const TickInput& input, BallEstimate& ball, CatchPlan& plan) noexcept {
+  const BallObservation& seen = input.ball;
+  const bool usable = input.ball_is_new && seen.run_id == memory_.run_id && seen.utime > memory_.ball_utime &&
+                      seen.utime <= input.state.utime && seen.p_K.allFinite();
+  if (!usable || !seen.valid || plan.phase == CatchPhase::kUncalibrated) return;
+  memory_.ball_utime = seen.utime;
+  const Vector3 p_A = memory_.T_AK * seen.p_K;
+  if (plan.phase == CatchPhase::kWaiting) {
+    // What it has in its cup is no new ball.
+    const Vector3 cup = kinematics::arm5_forward(arm_, memory_.motion.q.head<5>()).p;
+    if ((p_A - cup).norm() < config_.track.clear_of_cup && track_.observations() == 0) return;
+  } else if (plan.phase != CatchPhase::kCatching) {
+    return;
+  }
+  ball.nis = track_.observe(seen.utime, p_A);
+  ball.updated = true;
+  ball.utime = seen.utime;
+  ball.observation_seq = seen.seq;
+  const auto estimate = track_.at(seen.utime);
+  ball.p_A = estimate.p();
+  ball.v_A = estimate.v();
+  ball.covariance = estimate.P.topLeftCorner<6, 6>();
+  plan.observations = track_.observations();
+  plan.rejected = track_.rejected();
+}
+
+void CatcherController::enter(CatchPhase phase, CatchPlan& plan) noexcept {
+  plan.phase = phase;
+  memory_.phase_time = 0.0;
+}
+
+void CatcherController::plan(const RobotState& state, double dt, CatchPlan& plan) noexcept {
+  memory_.phase_time += dt;
+  const bool wanted = memory_.user_command.behaviour == Behaviour::kCatch;
+  const bool in_flight = track_.is_known(state.utime);
+  switch (plan.phase) {
+    case CatchPhase::kUncalibrated:
+      break;
+    case CatchPhase::kWaiting:
+      if (wanted && in_flight) enter(CatchPhase::kCatching, plan);
+      break;
+    case CatchPhase::kCatching: {
+      const double left = seconds(state.utime, plan.catch_utime);
+      const bool planned = interception_.plan().exists();
+      if (planned && left <= 0.0) {
+        enter(CatchPhase::kHolding, plan);
+      } else if (!wanted || (!in_flight && !(planned && plan.committed))) {
+        enter(CatchPhase::kReturning, plan);
+      }
+      break;
+    }
+    case CatchPhase::kHolding:
+      if (memory_.phase_time >= config_.course.hold_time) enter(CatchPhase::kReturning, plan);
+      break;
+    case CatchPhase::kReturning:
+      if (memory_.phase_time >= config_.course.return_time) enter(CatchPhase::kWaiting, plan);
+      break;
+  }
+  if (plan.phase == CatchPhase::kCatching) {
+    intercept(state, plan);
+  } else if (plan.phase == CatchPhase::kReturning && memory_.phase_time == 0.0) {
+    track_.reset();
+    interception_.reset();
+    plan.status = CatchStatus::kNone;
+    plan.committed = false;
+    plan.observations = 0;
+  }
+}
+
+void CatcherController::intercept(const RobotState& state, CatchPlan& plan) noexcept {
+  if (track_.is_known(state.utime)) {
+    const auto ball = track_.at(state.utime);
+    const double now = static_cast<double>(state.utime) * 1e-6;
+    const InterceptionPlan& found = interception_.update(now, {ball.p(), ball.v(), ball.x(6)}, memory_.motion);
+    plan.status = status_of(found.status);
+    plan.committed = found.committed;
+    if (!found.exists()) return;
+    plan.catch_utime = static_cast<std::int64_t>(std::llround(found.time * 1e6));
+    plan.p_ABall = found.p_ABall;
+    plan.q = found.q;
+    plan.slack = found.slack;
+    const RigidTransform cup = kinematics::arm5_forward(arm_, found.q.head<5>());
+    plan.p_ACup = cup.p;
+    plan.axis_ACup = cup.R.col(2);
+  }
+}
+
+/// The posture with its cup turned up, as far as the last pitch joint goes.
+JointVector CatcherController::upright(const JointVector& q) const noexcept {
+  // The axis is up where the pitch q2 + q3 + q4 is pi; from an arm that reaches over its back the same.
+  const auto& joint = model_.joints[3];
+  JointVector turned = q;
+  const double pitch = q[1] + q[2] + q[3];
+  turned[3] += std::remainder(std::numbers::pi - pitch, 2.0 * std::numbers::pi);
+  turned[3] =
+      std::clamp(turned[3], joint.lower + config_.planner.limit_margin, joint.upper - config_.planner.limit_margin);
+  return turned;
+}
+
+void CatcherController::move(const RobotState& state, double dt, CatchPlan& plan) noexcept {
+  planning::JointMotion& motion = memory_.motion;
+  // Where it was not led, the reference begins where the arm is.
+  if (!memory_.moving || ladder_.mode() == SafetyMode::kDamp) {
+    motion = planning::JointMotion{};
+    motion.q = state.now().joint_position;
+    if (!memory_.moving) memory_.phase_time = 0.0;
+    memory_.moving = true;
+  }
+  JointVector target = config_.place;
+  double time_left = config_.course.return_time - memory_.phase_time;
+  if (plan.phase == CatchPhase::kCatching && interception_.plan().exists()) {
+    target = plan.q;
+    time_left = seconds(state.utime, plan.catch_utime) - config_.course.arrive_early;
+  } else if (plan.phase == CatchPhase::kHolding) {
+    const bool settled = memory_.phase_time >= config_.course.settle;
+    target = settled ? upright(plan.q) : plan.q;
+    time_left = settled ? config_.course.settle + config_.course.upright_time - memory_.phase_time : 0.0;
+  }
+  if (dt > 0.0) planning::advance(config_.motion, model_.num_joints, target, time_left + dt, dt, motion);
+  plan.q_ref = motion.q;
+  plan.v_ref = motion.v;
+}
+
+void CatcherController::computed_torque(const planning::JointMotion& reference, JointCommand& command) const noexcept {
+  const rigid_body::Load gravity_only;
+  rigid_body::JointMatrix M;
+  rigid_body::joint_mass_matrix(tree_, reference.q, M);
+  command.feedforward_torque = rigid_body::inverse_dynamics(tree_, reference.q, reference.v, reference.a, gravity_only);
+  command.position = reference.q;
+  command.velocity = reference.v;
+  command.kp.head(model_.num_joints) = config_.computed_torque.kp * M.diagonal();
+  command.kd.head(model_.num_joints) = config_.computed_torque.kd * M.diagonal();
+}
+
+void CatcherController::give_up(SafetyMode mode, TickOutput& out) const noexcept {
+  out.command = JointCommand{};
+  out.command.num_joints = model_.num_joints;
+  out.command.mode = mode == SafetyMode::kDamp ? DriveMode::kDamp : DriveMode::kStop;
+  if (mode == SafetyMode::kDamp) out.command.kd = config_.damping;
+}
+
+}  // namespace stance::behaviours
