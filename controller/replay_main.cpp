@@ -33,7 +33,7 @@ struct Recording {
   std::map<std::int64_t, io::TraceKey> ticks;
   std::map<std::string, std::map<std::int64_t, Payload>, std::less<>> published;  // by channel and tick
   Named<std::pair<std::int64_t, std::int64_t>> states;                            // by run and seq
-  Named<std::int64_t> user_commands, stops;                                       // by seq
+  Named<std::int64_t> user_commands, stops, balls, calibrations;                  // by seq
 };
 
 template <typename Key>
@@ -59,6 +59,12 @@ Recording read(const std::string& file) {
     } else if (event.channel == io::channel::kStop) {
       io::Stop stop;
       if (io::decode(event.bytes, stop)) keep(recording.stops, stop.seq, payload);
+    } else if (event.channel == io::channel::kBallObservation) {
+      BallObservation ball;
+      if (io::decode(event.bytes, ball)) keep(recording.balls, ball.seq, payload);
+    } else if (event.channel == io::channel::kCalibrationPoints) {
+      CalibrationPoints points;
+      if (io::decode(event.bytes, points)) keep(recording.calibrations, points.seq, payload);
     } else if (event.channel == io::channel::kTrace) {
       io::TraceKey key;
       if (!io::decode(event.bytes, key)) continue;
@@ -76,6 +82,8 @@ struct Taken {
   const Payload* state = nullptr;
   const Payload* user_command = nullptr;
   const Payload* stop = nullptr;
+  const Payload* ball = nullptr;
+  const Payload* calibration = nullptr;
 };
 
 /// The recorded messages with the hash that the tick's trace states; nothing where the log does not hold them all.
@@ -96,8 +104,13 @@ std::optional<Taken> taken_by(const Recording& recording, const io::TraceKey& ti
   for (const Payload* state : states) {
     for (const Payload* user_command : choices(recording.user_commands, tick.consumed.user_command_seq, true)) {
       for (const Payload* stop : choices(recording.stops, tick.consumed.stop_seq, true)) {
-        if (loop::consumed_hash(hash(state), hash(user_command), hash(stop)) == tick.consumed.hash) {
-          return Taken{state, user_command, stop};
+        for (const Payload* ball : choices(recording.balls, tick.consumed.ball_seq, true)) {
+          for (const Payload* calibration : choices(recording.calibrations, tick.consumed.calibration_seq, true)) {
+            const loop::TakenHashes taken{hash(state), hash(user_command), hash(stop), hash(ball), hash(calibration)};
+            if (loop::consumed_hash(taken) == tick.consumed.hash) {
+              return Taken{state, user_command, stop, ball, calibration};
+            }
+          }
         }
       }
     }
@@ -130,12 +143,15 @@ Outcome verify(const Recording& recording) {
       outcome.incomplete = "the log does not hold what tick " + std::to_string(seq) + " took: state " +
                            std::to_string(tick.header.state_seq) + ", user command " +
                            std::to_string(tick.consumed.user_command_seq) + ", stop " +
-                           std::to_string(tick.consumed.stop_seq) + ", as they were";
+                           std::to_string(tick.consumed.stop_seq) + ", ball " + std::to_string(tick.consumed.ball_seq) +
+                           ", calibration points " + std::to_string(tick.consumed.calibration_seq) + ", as they were";
       break;
     }
     if (taken->state != nullptr) static_cast<void>(ticker.offer_state(*taken->state));
     if (taken->user_command != nullptr) static_cast<void>(ticker.offer_user_command(*taken->user_command));
     if (taken->stop != nullptr) static_cast<void>(ticker.offer_stop(*taken->stop));
+    if (taken->ball != nullptr) static_cast<void>(ticker.offer_ball(*taken->ball));
+    if (taken->calibration != nullptr) static_cast<void>(ticker.offer_calibration(*taken->calibration));
     ticker.tick(tick.consumed.periods, clock);
     ++outcome.ticks;
 

@@ -2,6 +2,10 @@
 
 #include <algorithm>
 #include <stance_msgs/arm3_motion_t.hpp>
+#include <stance_msgs/ball_estimate_t.hpp>
+#include <stance_msgs/ball_observation_t.hpp>
+#include <stance_msgs/calibration_points_t.hpp>
+#include <stance_msgs/catch_plan_t.hpp>
 #include <stance_msgs/controller_timing_t.hpp>
 #include <stance_msgs/controller_trace_t.hpp>
 #include <stance_msgs/force_plan_t.hpp>
@@ -14,6 +18,10 @@ namespace stance::io {
 namespace {
 
 using stance_msgs::arm3_motion_t;
+using stance_msgs::ball_estimate_t;
+using stance_msgs::ball_observation_t;
+using stance_msgs::calibration_points_t;
+using stance_msgs::catch_plan_t;
 using stance_msgs::controller_timing_t;
 using stance_msgs::controller_trace_t;
 using stance_msgs::force_plan_t;
@@ -28,6 +36,7 @@ static_assert(joint_command_t::MAX_JOINTS == kMaxJoints);
 static_assert(force_plan_t::MAX_CONTACTS == kMaxContacts && force_plan_t::MAX_STAGES == kMaxPlanStages);
 static_assert(controller_trace_t::MAX_CONTACTS == kMaxContacts && controller_trace_t::NUM_FAULTS == kNumFaults);
 static_assert(controller_timing_t::NUM_STAGES == kNumStages);
+static_assert(calibration_points_t::MAX_POINTS == kMaxCalibrationPoints && catch_plan_t::MAX_JOINTS == kMaxJoints);
 
 /// A whole message and nothing else, or false.
 template <typename Lcm>
@@ -103,11 +112,41 @@ bool decode(Bytes bytes, Stop& out) noexcept {
   return true;
 }
 
+bool decode(Bytes bytes, BallObservation& out) noexcept {
+  ball_observation_t message{};
+  if (!decode_whole(bytes, message)) return false;
+  out.utime = message.utime;
+  out.seq = message.seq;
+  out.run_id = message.run_id;
+  out.valid = message.valid != 0;
+  copy_in(message.p_KBall, out.p_K);
+  return true;
+}
+
+bool decode(Bytes bytes, CalibrationPoints& out) noexcept {
+  calibration_points_t message{};
+  if (!decode_whole(bytes, message)) return false;
+  out.utime = message.utime;
+  out.seq = message.seq;
+  out.run_id = message.run_id;
+  out.num_points = message.num_points;
+  for (std::size_t i = 0; i < kMaxCalibrationPoints; ++i) {
+    copy_in(message.p_K[i], out.p_K[i]);
+    copy_in(message.p_A[i], out.p_A[i]);
+  }
+  return true;
+}
+
 bool decode(Bytes bytes, TraceKey& out) noexcept {
   controller_trace_t message{};
   if (!decode_whole(bytes, message)) return false;
   out.header = {message.utime, message.seq, message.state_seq, message.run_id};
-  out.consumed = {message.state_is_new != 0, message.periods, message.user_command_seq, message.stop_seq,
+  out.consumed = {message.state_is_new != 0,
+                  message.periods,
+                  message.user_command_seq,
+                  message.stop_seq,
+                  message.ball_seq,
+                  message.calibration_seq,
                   static_cast<std::uint64_t>(message.consumed_hash)};
   return true;
 }
@@ -119,6 +158,10 @@ std::optional<std::int64_t> tick_of(std::string_view channel, Bytes bytes) noexc
   if (channel == io::channel::kForcePlan && decode_whole(bytes, plan)) return plan.seq;
   arm3_motion_t motion{};
   if (channel == io::channel::kArm3Motion && decode_whole(bytes, motion)) return motion.seq;
+  ball_estimate_t ball{};
+  if (channel == io::channel::kBallEstimate && decode_whole(bytes, ball)) return ball.seq;
+  catch_plan_t catching{};
+  if (channel == io::channel::kCatchPlan && decode_whole(bytes, catching)) return catching.seq;
   return std::nullopt;
 }
 
@@ -170,6 +213,44 @@ void encode(const Header& header, const Arm3Motion& motion, Message& out) noexce
   encode_whole(message, out);
 }
 
+void encode(const Header& header, const BallEstimate& ball, Message& out) noexcept {
+  out.size = 0;
+  if (!ball.updated) return;
+  ball_estimate_t message{};
+  message.utime = ball.utime;
+  message.seq = header.seq;
+  message.observation_seq = ball.observation_seq;
+  message.run_id = header.run_id;
+  copy_out(ball.p_A, message.p_ABall);
+  copy_out(ball.v_A, message.v_ABall);
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) message.covariance[i][j] = ball.covariance(i, j);
+  }
+  message.nis = ball.nis;
+  encode_whole(message, out);
+}
+
+void encode(const Header& header, const CatchPlan& plan, Message& out) noexcept {
+  catch_plan_t message{};
+  set_header(header, message);
+  message.phase = static_cast<std::int8_t>(plan.phase);
+  message.calibration = static_cast<std::int8_t>(plan.calibration);
+  message.calibration_rms = plan.calibration_rms;
+  message.status = static_cast<std::int8_t>(plan.status);
+  message.committed = plan.committed ? 1 : 0;
+  message.catch_utime = plan.catch_utime;
+  copy_out(plan.p_ABall, message.p_ABall);
+  copy_out(plan.p_ACup, message.p_ACup);
+  copy_out(plan.axis_ACup, message.axis_ACup);
+  copy_out(plan.q, message.q);
+  message.slack = plan.slack;
+  copy_out(plan.q_ref, message.q_ref);
+  copy_out(plan.v_ref, message.v_ref);
+  message.observations = plan.observations;
+  message.rejected = plan.rejected;
+  encode_whole(message, out);
+}
+
 void encode(const Header& header, const Consumed& consumed, const Trace& trace, Message& out) noexcept {
   controller_trace_t message{};
   set_header(header, message);
@@ -177,6 +258,8 @@ void encode(const Header& header, const Consumed& consumed, const Trace& trace, 
   message.periods = consumed.periods;
   message.user_command_seq = consumed.user_command_seq;
   message.stop_seq = consumed.stop_seq;
+  message.ball_seq = consumed.ball_seq;
+  message.calibration_seq = consumed.calibration_seq;
   message.consumed_hash = static_cast<std::int64_t>(consumed.hash);
   message.safety = static_cast<std::int8_t>(trace.safety);
   message.faults = static_cast<std::int32_t>(trace.faults);

@@ -18,9 +18,13 @@ namespace channel {
 inline constexpr const char* kRobotState = "ROBOT_STATE";
 inline constexpr const char* kUserCommand = "USER_COMMAND";
 inline constexpr const char* kStop = "STOP";
+inline constexpr const char* kBallObservation = "BALL_OBSERVATION";
+inline constexpr const char* kCalibrationPoints = "CALIBRATION_POINTS";
 inline constexpr const char* kJointCommand = "JOINT_COMMAND";
 inline constexpr const char* kForcePlan = "FORCE_PLAN";
 inline constexpr const char* kArm3Motion = "ARM3_MOTION";
+inline constexpr const char* kBallEstimate = "BALL_ESTIMATE";
+inline constexpr const char* kCatchPlan = "CATCH_PLAN";
 inline constexpr const char* kTrace = "CONTROLLER_TRACE";
 inline constexpr const char* kTiming = "CONTROLLER_TIMING";
 inline constexpr const char* kRunInfo = "RUN_INFO_CONTROLLER";
@@ -40,7 +44,9 @@ struct Consumed {
   int periods = 1;
   std::int64_t user_command_seq = 0;
   std::int64_t stop_seq = 0;
-  std::uint64_t hash = 0;  ///< of the bytes of the newest state, user command and stop that came since the last tick
+  std::int64_t ball_seq = 0;
+  std::int64_t calibration_seq = 0;
+  std::uint64_t hash = 0;  ///< of the bytes of the newest message of each kind that came since the last tick
 };
 
 /// What the wall clock says of a tick.
@@ -67,6 +73,8 @@ struct Stop {
 [[nodiscard]] bool decode(Bytes bytes, RobotState& out) noexcept;
 [[nodiscard]] bool decode(Bytes bytes, UserCommand& out) noexcept;
 [[nodiscard]] bool decode(Bytes bytes, Stop& out) noexcept;
+[[nodiscard]] bool decode(Bytes bytes, BallObservation& out) noexcept;
+[[nodiscard]] bool decode(Bytes bytes, CalibrationPoints& out) noexcept;
 /// The trace's record of what its tick consumed, for replay.
 struct TraceKey {
   Header header;
@@ -89,6 +97,9 @@ struct Message {
 void encode(const Header& header, const JointCommand& command, Message& out) noexcept;
 void encode(const Header& header, const ForcePlan& plan, Message& out) noexcept;
 void encode(const Header& header, const Arm3Motion& motion, Message& out) noexcept;
+/// Nothing, size 0, where no observation came in the tick.
+void encode(const Header& header, const BallEstimate& ball, Message& out) noexcept;
+void encode(const Header& header, const CatchPlan& plan, Message& out) noexcept;
 void encode(const Header& header, const Consumed& consumed, const Trace& trace, Message& out) noexcept;
 void encode(const Header& header, const Timing& timing, Message& out) noexcept;
 

@@ -11,11 +11,17 @@ void run_lockstep(Ticker& ticker, io::Transport& transport, const std::vector<st
   std::int64_t last_utime = 0;
 
   const auto answer = [&] {
-    for (const Published& out : ticker.published()) transport.publish(out.channel, out.message.bytes());
+    for (const Published& out : ticker.published()) {
+      if (out.message.size > 0) transport.publish(out.channel, out.message.bytes());
+    }
   };
   transport.subscribe(io::channel::kUserCommand,
                       [&](io::Bytes bytes) { static_cast<void>(ticker.offer_user_command(bytes)); });
   transport.subscribe(io::channel::kStop, [&](io::Bytes bytes) { static_cast<void>(ticker.offer_stop(bytes)); });
+  transport.subscribe(io::channel::kBallObservation,
+                      [&](io::Bytes bytes) { static_cast<void>(ticker.offer_ball(bytes)); });
+  transport.subscribe(io::channel::kCalibrationPoints,
+                      [&](io::Bytes bytes) { static_cast<void>(ticker.offer_calibration(bytes)); });
   transport.subscribe(io::channel::kRobotState, [&](io::Bytes bytes) {
     RobotState state;
     if (!io::decode(bytes, state)) return;

@@ -14,7 +14,7 @@ static_assert(kPeriodNs * 1e-9 == kControlPeriod);
 
 /// What the receiving thread leaves for the control thread.
 struct Inbox {
-  Mailbox<io::Message> state, user_command, stop;
+  Mailbox<io::Message> state, user_command, stop, ball, calibration;
   std::atomic<std::int64_t> dropped_states{0};
 
   static bool put(Mailbox<io::Message>& box, io::Bytes bytes) noexcept {
@@ -47,6 +47,8 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
   });
   transport.subscribe(io::channel::kUserCommand, [&](io::Bytes bytes) { Inbox::put(inbox.user_command, bytes); });
   transport.subscribe(io::channel::kStop, [&](io::Bytes bytes) { Inbox::put(inbox.stop, bytes); });
+  transport.subscribe(io::channel::kBallObservation, [&](io::Bytes bytes) { Inbox::put(inbox.ball, bytes); });
+  transport.subscribe(io::channel::kCalibrationPoints, [&](io::Bytes bytes) { Inbox::put(inbox.calibration, bytes); });
   std::thread receiver([&] {
     platform::EverySecond info_pace;
     while (!stop.load(std::memory_order_relaxed)) {
@@ -59,6 +61,9 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
     if (const io::Message* bytes = inbox.user_command.take())
       static_cast<void>(ticker.offer_user_command(bytes->bytes()));
     if (const io::Message* bytes = inbox.stop.take()) static_cast<void>(ticker.offer_stop(bytes->bytes()));
+    if (const io::Message* bytes = inbox.ball.take()) static_cast<void>(ticker.offer_ball(bytes->bytes()));
+    if (const io::Message* bytes = inbox.calibration.take())
+      static_cast<void>(ticker.offer_calibration(bytes->bytes()));
     if (const io::Message* bytes = inbox.state.take()) static_cast<void>(ticker.offer_state(bytes->bytes()));
   };
 
@@ -94,7 +99,9 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
     clock.start();
     timing.state_age_us = static_cast<double>(timing.start_utime) - static_cast<double>(ticker.state().utime);
     ticker.tick(periods, clock);
-    for (const Published& out : ticker.published()) transport.publish(out.channel, out.message.bytes());
+    for (const Published& out : ticker.published()) {
+      if (out.message.size > 0) transport.publish(out.channel, out.message.bytes());
+    }
     clock.finish();
 
     if (ticker.state().run_id != run_id) {

@@ -19,9 +19,11 @@ int periods_between(std::int64_t utime, std::int64_t next_utime) noexcept {
   return static_cast<int>(std::clamp(periods, 1.0, 1e6));
 }
 
-std::uint64_t consumed_hash(std::uint64_t state, std::uint64_t user_command, std::uint64_t stop) noexcept {
+std::uint64_t consumed_hash(const TakenHashes& taken) noexcept {
   std::uint64_t hash = platform::kHashSeed;
-  for (const std::uint64_t part : {state, user_command, stop}) hash = platform::hash_step(hash, part);
+  for (const std::uint64_t part : {taken.state, taken.user_command, taken.stop, taken.ball, taken.calibration}) {
+    hash = platform::hash_step(hash, part);
+  }
   return hash;
 }
 
@@ -34,17 +36,25 @@ Ticker::Ticker(Controller controller) : controller_(std::move(controller)) {
 bool Ticker::offer_state(io::Bytes bytes) noexcept {
   if (!io::decode(bytes, input_.state)) return false;
   consumed_.state_is_new = true;
-  state_hash_ = platform::hash(bytes);
+  hashes_.state = platform::hash(bytes);
   return true;
 }
 
 void Ticker::end_run() noexcept {
-  if (user_command_hash_ == 0) {
+  if (hashes_.user_command == 0) {
     input_.user_command = UserCommand{};
     consumed_.user_command_seq = 0;
   }
+  if (hashes_.ball == 0) {
+    input_.ball = BallObservation{};
+    consumed_.ball_seq = 0;
+  }
+  if (hashes_.calibration == 0) {
+    input_.calibration = CalibrationPoints{};
+    consumed_.calibration_seq = 0;
+  }
   // A sender that counts from 1 again under the same id may be a message gone astray: no reason to undo a stop.
-  if (stop_hash_ == 0 && input_.state.run_id != header_.run_id) {
+  if (hashes_.stop == 0 && input_.state.run_id != header_.run_id) {
     input_.operator_stop = false;
     consumed_.stop_seq = 0;
   }
@@ -53,7 +63,7 @@ void Ticker::end_run() noexcept {
 bool Ticker::offer_user_command(io::Bytes bytes) noexcept {
   if (!io::decode(bytes, input_.user_command)) return false;
   consumed_.user_command_seq = input_.user_command.seq;
-  user_command_hash_ = platform::hash(bytes);
+  hashes_.user_command = platform::hash(bytes);
   return true;
 }
 
@@ -62,17 +72,32 @@ bool Ticker::offer_stop(io::Bytes bytes) noexcept {
   if (!io::decode(bytes, stop)) return false;
   input_.operator_stop = true;
   consumed_.stop_seq = stop.seq;
-  stop_hash_ = platform::hash(bytes);
+  hashes_.stop = platform::hash(bytes);
+  return true;
+}
+
+bool Ticker::offer_ball(io::Bytes bytes) noexcept {
+  if (!io::decode(bytes, input_.ball)) return false;
+  consumed_.ball_seq = input_.ball.seq;
+  hashes_.ball = platform::hash(bytes);
+  return true;
+}
+
+bool Ticker::offer_calibration(io::Bytes bytes) noexcept {
+  if (!io::decode(bytes, input_.calibration)) return false;
+  consumed_.calibration_seq = input_.calibration.seq;
+  hashes_.calibration = platform::hash(bytes);
   return true;
 }
 
 void Ticker::tick(int periods, StageClock& clock) noexcept {
   if (starts_run(header_.run_id, header_.state_seq, input_.state)) end_run();
   consumed_.periods = periods;
-  consumed_.hash = consumed_hash(state_hash_, user_command_hash_, stop_hash_);
+  consumed_.hash = consumed_hash(hashes_);
   late_periods_ = consumed_.state_is_new ? 0 : late_periods_ + periods;
   input_.state_is_new = consumed_.state_is_new;
   input_.periods = periods;
+  input_.ball_is_new = hashes_.ball != 0;
   clock.stamp(Stage::kDecode);
   controller_.tick(input_, clock, output_);
 
@@ -89,7 +114,7 @@ void Ticker::tick(int periods, StageClock& clock) noexcept {
   io::encode(header_, output_.command, published_[own].message);
   io::encode(header_, consumed_, output_.trace, published_[own + 1].message);
   consumed_.state_is_new = false;
-  state_hash_ = user_command_hash_ = stop_hash_ = 0;
+  hashes_ = TakenHashes{};
   clock.stamp(Stage::kEncode);
 }
 

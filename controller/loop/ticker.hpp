@@ -42,8 +42,12 @@ struct Published {
 /// Control periods from one state's stamp to the next one's, at least 1.
 int periods_between(std::int64_t utime, std::int64_t next_utime) noexcept;
 
-/// Consumed::hash, from the hashes of the messages that a tick took anew, 0 for none.
-std::uint64_t consumed_hash(std::uint64_t state, std::uint64_t user_command, std::uint64_t stop) noexcept;
+/// Of the messages that a tick took anew, 0 for none.
+struct TakenHashes {
+  std::uint64_t state = 0, user_command = 0, stop = 0, ball = 0, calibration = 0;
+};
+/// Consumed::hash.
+std::uint64_t consumed_hash(const TakenHashes& taken) noexcept;
 
 class Ticker {
  public:
@@ -53,6 +57,8 @@ class Ticker {
   [[nodiscard]] bool offer_state(io::Bytes bytes) noexcept;
   [[nodiscard]] bool offer_user_command(io::Bytes bytes) noexcept;
   [[nodiscard]] bool offer_stop(io::Bytes bytes) noexcept;
+  [[nodiscard]] bool offer_ball(io::Bytes bytes) noexcept;
+  [[nodiscard]] bool offer_calibration(io::Bytes bytes) noexcept;
 
   /// Is there a state that no tick has consumed?
   bool has_new_state() const noexcept { return consumed_.state_is_new; }
@@ -64,7 +70,7 @@ class Ticker {
   const io::Header& header() const noexcept { return header_; }
   const TickOutput& output() const noexcept { return output_; }
   /// All that the last tick published, in the order in which it goes out: the robot's own messages, its command, its
-  /// trace.
+  /// trace. An empty one does not go out.
   std::span<const Published> published() const noexcept { return published_; }
   const io::Message& command() const noexcept { return published_[published_.size() - 2].message; }
   const io::Message& trace() const noexcept { return published_.back().message; }
@@ -77,9 +83,8 @@ class Ticker {
   TickInput input_;
   TickOutput output_;
   io::Header header_;
-  io::Consumed consumed_;  ///< by the coming tick
-  // Of the newest bytes of each kind since the last tick, 0 for none.
-  std::uint64_t state_hash_ = 0, user_command_hash_ = 0, stop_hash_ = 0;
+  io::Consumed consumed_;          ///< by the coming tick
+  TakenHashes hashes_;             ///< of the newest bytes of each kind since the last tick
   std::int64_t late_periods_ = 0;  ///< since the state in use
   std::vector<Published> published_;
 };
