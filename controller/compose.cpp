@@ -9,8 +9,10 @@
 
 #include "controller/behaviours/arm3_controller.hpp"
 #include "controller/behaviours/biped_controller.hpp"
+#include "controller/behaviours/catcher_controller.hpp"
 #include "controller/config/arm3_config_yaml.hpp"
 #include "controller/config/biped_config_yaml.hpp"
+#include "controller/config/catcher_config_yaml.hpp"
 
 namespace stance {
 namespace {
@@ -33,11 +35,17 @@ loop::Controller arm3(const config::RobotDescription& robot) {
           {loop::kArm3Motion}};
 }
 
+loop::Controller catcher(const config::RobotDescription& robot) {
+  return {ticks_of(std::make_shared<behaviours::CatcherController>(config::catcher_config(robot), robot.model)),
+          {loop::publication<&TickOutput::ball>(io::channel::kBallEstimate),
+           loop::publication<&TickOutput::catching>(io::channel::kCatchPlan)}};
+}
+
 struct Entry {
   std::string_view robot;
   loop::Controller (*compose)(const config::RobotDescription& robot);
 };
-constexpr std::array kRobots = {Entry{"biped", biped}, Entry{"arm3", arm3}};
+constexpr std::array kRobots = {Entry{"biped", biped}, Entry{"arm3", arm3}, Entry{"catcher", catcher}};
 
 }  // namespace
 

@@ -28,6 +28,19 @@ kinematics::FallLimits fall_limits(StrictYaml yaml) {
   return out;
 }
 
+Cup cup_from(StrictYaml yaml) {
+  Cup out;
+  out.link = yaml.text("link");
+  const auto position = yaml.numbers("position", 3);
+  out.position = {position[0], position[1], position[2]};
+  out.radius = yaml.number("radius");
+  if (!(out.radius > 0.0)) yaml.fail("radius", "must be > 0 m");
+  out.depth = yaml.number("depth");
+  if (!(out.depth > 0.0)) yaml.fail("depth", "must be > 0 m");
+  yaml.finish();
+  return out;
+}
+
 }  // namespace
 
 std::string read_text(const std::filesystem::path& file) {
@@ -77,11 +90,13 @@ RobotDescription robot_from_texts(const std::string& yaml_text, const std::strin
   } else if (yaml.has("fallen")) {
     yaml.fail("fallen", "is of a robot with feet: remove it, or name them in feet");
   }
+  if (yaml.has("cup")) robot.cup = cup_from(yaml.mapping("cup"));
   yaml.leave("controller");
   yaml.finish();
   try {
     robot.model = rigid_body::model_from_urdf(urdf_text, robot.joint_names);
     robot.feet = rigid_body::feet_from_urdf(urdf_text, robot.model, robot.foot_links);
+    if (robot.cup) robot.cup->body = robot.model.body_index(robot.cup->link);
   } catch (const std::invalid_argument& error) {
     throw ConfigError(robot.name + " URDF: " + error.what());
   }

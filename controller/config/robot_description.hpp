@@ -2,6 +2,7 @@
 // What robots/<robot>/ says of a robot's body: the one source of its masses, lengths, limits, joint order, feet and
 // drives.
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,6 +17,15 @@ struct DriveDescription {
   double command_timeout = 0.0;               ///< s without a valid command after which the drives damp
 };
 
+/// What a robot catches with. Its plane is square to the link's z, which points out of it.
+struct Cup {
+  std::string link;
+  int body = 0;                        ///< body index
+  Vector3 position = Vector3::Zero();  ///< m, the plane's centre in the link frame
+  double radius = 0.0;                 ///< m, from the axis to the walls
+  double depth = 0.0;                  ///< m, from the plane to the floor
+};
+
 struct RobotDescription {
   std::string name;
   std::string urdf_text;
@@ -27,6 +37,7 @@ struct RobotDescription {
   JointVector nominal_joint_position = JointVector::Zero();  ///< rad
   DriveDescription drives;
   kinematics::FallLimits fallen;  ///< of a robot with feet
+  std::optional<Cup> cup;
 
   bool has_feet() const { return !foot_links.empty(); }
 };
