@@ -26,6 +26,9 @@ static_assert(kPeriodNs == 10'000'000);
 const std::string kRobotState = "ROBOT_STATE";
 const std::string kTruth = "TRUTH";
 const std::string kUserCommand = "USER_COMMAND";
+const std::string kCalibrationPoints = "CALIBRATION_POINTS";
+const std::string kBallObservation = "BALL_OBSERVATION";
+const std::string kBallTruth = "BALL_TRUTH";
 const std::string kRunInfo = "RUN_INFO_SIMULATOR";
 
 /// FNV-1a, 64 bit, of the texts one after the other, in hexadecimal.
@@ -72,6 +75,7 @@ Node::Node(lcm::LCM& lcm, Simulator& simulator, std::vector<std::uint8_t> run_in
   constexpr int queue = 16;
   lcm_.subscribeFunction("JOINT_COMMAND", &Node::on_command, this)->setQueueCapacity(queue);
   lcm_.subscribeFunction("FORCE_PLAN", &Node::on_plan, this)->setQueueCapacity(queue);
+  lcm_.subscribeFunction("CATCH_PLAN", &Node::on_catch_plan, this)->setQueueCapacity(queue);
   lcm_.subscribeFunction("PUSH", &Node::on_push, this)->setQueueCapacity(queue);
   lcm_.subscribeFunction(kUserCommand, &Node::on_user_command, this)->setQueueCapacity(queue);
 }
@@ -88,6 +92,10 @@ void Node::on_plan(const Buffer*, const std::string&, const stance_msgs::force_p
   node->simulator_.accept(*plan);
 }
 
+void Node::on_catch_plan(const Buffer*, const std::string&, const stance_msgs::catch_plan_t* plan, Node* node) {
+  node->simulator_.accept(*plan);
+}
+
 void Node::on_push(const Buffer*, const std::string&, const stance_msgs::push_t* push, Node* node) {
   node->simulator_.accept(*push);
 }
@@ -100,16 +108,21 @@ void Node::publish_state() {
   lcm_.publish(kRobotState, state_bytes_.data(), static_cast<unsigned>(state_bytes_.size()));
 }
 
+template <typename Message>
+void Node::publish(const std::string& channel, const Message& message) {
+  encode(message, bytes_);
+  lcm_.publish(channel, bytes_.data(), static_cast<unsigned>(bytes_.size()));
+}
+
 void Node::publish_truth() {
-  encode(simulator_.truth(), truth_bytes_);
-  lcm_.publish(kTruth, truth_bytes_.data(), static_cast<unsigned>(truth_bytes_.size()));
+  publish(kTruth, simulator_.truth());
+  if (const auto* ball = simulator_.ball_truth()) publish(kBallTruth, *ball);
 }
 
 void Node::publish_instant() {
-  if (const auto* command = simulator_.user_command()) {
-    encode(*command, user_command_bytes_);
-    lcm_.publish(kUserCommand, user_command_bytes_.data(), static_cast<unsigned>(user_command_bytes_.size()));
-  }
+  if (const auto* command = simulator_.user_command()) publish(kUserCommand, *command);
+  if (const auto* points = simulator_.calibration_points()) publish(kCalibrationPoints, *points);
+  if (const auto* ball = simulator_.ball_observation()) publish(kBallObservation, *ball);
   encode(simulator_.state(), state_bytes_);
   publish_state();
   publish_truth();

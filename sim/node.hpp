@@ -1,5 +1,6 @@
 #pragma once
-// The simulator on LCM. At each instant, in this order: USER_COMMAND where one is due, ROBOT_STATE, TRUTH.
+// The simulator on LCM. At each instant, in this order: USER_COMMAND, CALIBRATION_POINTS and
+// BALL_OBSERVATION where one is due, ROBOT_STATE, TRUTH, BALL_TRUTH of a robot with a cup.
 //
 // Lockstep: the next instant comes when the JOINT_COMMAND that answers the state has arrived; the controller sends its
 // FORCE_PLAN before it. Without an answer the same bytes of the state go out again and again, and silence ends the run.
@@ -62,9 +63,12 @@ class Node {
   using Buffer = lcm::ReceiveBuffer;
   static void on_command(const Buffer*, const std::string&, const stance_msgs::joint_command_t* command, Node* node);
   static void on_plan(const Buffer*, const std::string&, const stance_msgs::force_plan_t* plan, Node* node);
+  static void on_catch_plan(const Buffer*, const std::string&, const stance_msgs::catch_plan_t* plan, Node* node);
   static void on_push(const Buffer*, const std::string&, const stance_msgs::push_t* push, Node* node);
   static void on_user_command(const Buffer*, const std::string&, const stance_msgs::user_command_t* command,
                               Node* node);
+  template <typename Message>
+  void publish(const std::string& channel, const Message& message);
   void publish_instant();
   void publish_state();
   void publish_truth();
@@ -76,8 +80,7 @@ class Node {
   Simulator& simulator_;
   std::vector<std::uint8_t> run_info_;
   std::vector<std::uint8_t> state_bytes_;
-  std::vector<std::uint8_t> truth_bytes_;
-  std::vector<std::uint8_t> user_command_bytes_;
+  std::vector<std::uint8_t> bytes_;  // of other messages, one after the other
   platform::EverySecond run_info_pace_;
   std::int64_t answered_seq_ = 0;  // newest state that a command answered
   bool was_damped_ = false;

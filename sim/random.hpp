@@ -5,6 +5,8 @@
 #include <cstdint>
 #include <random>
 
+#include "controller/math/so3.hpp"
+
 namespace stance::sim {
 
 /// In [0, 1), by `key` alone: for what is drawn by its name or place, in no order (splitmix64's finaliser).
@@ -48,5 +50,13 @@ class Random {
   double spare_ = 0.0;
   bool has_spare_ = false;
 };
+
+/// Three of Random::normal.
+inline Vector3 normal3(Random& random) {
+  const double x = random.normal();
+  const double y = random.normal();
+  const double z = random.normal();
+  return {x, y, z};
+}
 
 }  // namespace stance::sim

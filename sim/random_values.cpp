@@ -26,7 +26,7 @@ class Drawing {
   const std::vector<DrawnValue>& values() const { return values_; }
 
  private:
-  static bool is_random(const YAML::Node& node) { return node["uniform"] || node["choice"]; }
+  static bool is_random(const YAML::Node& node) { return node["uniform"] || node["normal"] || node["choice"]; }
 
   [[noreturn]] void fail(const std::string& path, const std::string& problem) const {
     throw config::ConfigError(name_ + ": " + path + " " + problem);
@@ -52,13 +52,19 @@ class Drawing {
   YAML::Node random_value(const YAML::Node& node, const std::string& path) {
     for (const auto& entry : node) {
       const std::string& key = entry.first.Scalar();
-      const bool known = node["choice"] ? key == "choice" : key == "uniform" || key == "step";
+      const bool known = node["choice"]   ? key == "choice"
+                         : node["normal"] ? key == "normal"
+                                          : key == "uniform" || key == "step";
       if (!known) {
-        fail(path, "has '" + key + "' beside its random value: give {uniform: [a, b]}, with step or without, or " +
-                       "{choice: [...]}");
+        fail(path, "has '" + key + "' beside its random value: give {uniform: [a, b]}, with step or without, " +
+                       "{normal: [mean, sigma]}, or {choice: [...]}");
       }
     }
     const double u = keyed_uniform(platform::hash(path, platform::hash_step(platform::kHashSeed, seed_)));
+    if (node["normal"]) {
+      return normal(node["normal"], path, u,
+                    keyed_uniform(platform::hash(path + ".angle", platform::hash_step(platform::kHashSeed, seed_))));
+    }
     return node["choice"] ? choice(node["choice"], path, u) : uniform(node, path, u);
   }
 
@@ -74,6 +80,16 @@ class Drawing {
       constexpr double rounding = 1e-9;  // of the range, so that its upper end counts
       value = low + step * std::floor(u * (std::floor((high - low) / step + rounding) + 1.0));
     }
+    values_.push_back({path, platform::to_text(value)});
+    return YAML::Node(values_.back().value);
+  }
+
+  /// By Box and Muller.
+  YAML::Node normal(const YAML::Node& of, const std::string& path, double u, double turn) {
+    if (!of.IsSequence() || of.size() != 2) fail(path + ".normal", "must be a list of a mean and a standard deviation");
+    const double mean = number(of[0], path + ".normal"), sigma = number(of[1], path + ".normal");
+    if (!(sigma >= 0.0)) fail(path + ".normal", "must have a standard deviation >= 0");
+    const double value = mean + sigma * std::sqrt(-2.0 * std::log(1.0 - u)) * std::cos(2.0 * M_PI * turn);
     values_.push_back({path, platform::to_text(value)});
     return YAML::Node(values_.back().value);
   }

@@ -2,6 +2,7 @@
 // Random values of a scenario. In the place of any value may stand
 //   {uniform: [a, b]}            a number in [a, b]
 //   {uniform: [a, b], step: s}   one of a, a + s, ... up to b, each as likely
+//   {normal: [m, s]}             a number of mean m and standard deviation s
 //   {choice: [v1, v2, ...]}      one of these, each as likely: numbers, words, lists or mappings, in which random
 //   values
 //                                may stand again

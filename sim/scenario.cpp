@@ -56,7 +56,8 @@ bool is_word(StrictYaml& yaml, const std::string& key, const std::string& word) 
 /// name, so that nothing in a scenario goes unheard.
 class Kind {
  public:
-  explicit Kind(const config::RobotDescription& robot) : has_feet_(robot.has_feet()), robot_(robot.name) {}
+  explicit Kind(const config::RobotDescription& robot)
+      : has_feet_(robot.has_feet()), has_cup_(robot.cup.has_value()), robot_(robot.name) {}
 
   /// Are `keys`, which only robots with feet have, to be read?
   bool with_feet(const StrictYaml& yaml, std::initializer_list<const char*> keys) const {
@@ -65,6 +66,10 @@ class Kind {
   /// The same of keys which only robots without feet have.
   bool without_feet(const StrictYaml& yaml, std::initializer_list<const char*> keys) const {
     return ask(yaml, keys, !has_feet_, "is of robots without feet, and " + robot_ + " has some: remove it");
+  }
+  /// The same of keys which only robots with a cup have.
+  bool with_cup(const StrictYaml& yaml, std::initializer_list<const char*> keys) const {
+    return ask(yaml, keys, has_cup_, "is of robots with a cup, and " + robot_ + " has none: remove it");
   }
 
  private:
@@ -76,7 +81,7 @@ class Kind {
     return ours;
   }
 
-  bool has_feet_;
+  bool has_feet_, has_cup_;
   std::string robot_;
 };
 
@@ -172,6 +177,55 @@ ScheduledPush push_from(StrictYaml yaml) {
   return push;
 }
 
+BallModel ball_from(StrictYaml yaml, double& taken_after) {
+  BallModel ball;
+  ball.radius = number_in(yaml, "radius", 0.005, 0.1);
+  ball.mass = number_in(yaml, "mass", 1e-4, 10.0);
+  ball.drag = number_in(yaml, "drag", 0.0, 1.0);
+  ball.restitution = number_in(yaml, "restitution", 0.0, 1.0);
+  ball.friction = number_in(yaml, "friction", 0.0, 10.0);
+  taken_after = number_in(yaml, "taken_after", kControlPeriod, 1e6);
+  yaml.finish();
+  return ball;
+}
+
+ScheduledThrow throw_from(StrictYaml yaml) {
+  ScheduledThrow thrown;
+  thrown.time = number_in(yaml, "time", 0.0, 1e6);
+  thrown.flight_time = number_in(yaml, "flight_time", 0.05, 10.0);
+  thrown.aim_W = vector(yaml, "aim_W");
+  const double distance = number_in(yaml, "distance", 0.0, 100.0), azimuth = yaml.number("azimuth");
+  thrown.from_W = {distance * std::cos(azimuth), distance * std::sin(azimuth), number_in(yaml, "height", 0.0, 100.0)};
+  yaml.finish();
+  return thrown;
+}
+
+CameraModel camera_from(StrictYaml yaml) {
+  constexpr int longest = 100;  // control periods
+  CameraModel camera;
+  camera.period = whole_steps(yaml, "period", kControlPeriod, longest);
+  if (camera.period == 0) yaml.fail("period", "must be > 0 s");
+  camera.latency = whole_steps(yaml, "latency", kControlPeriod, kMaxCameraLatency);
+  camera.sigma = number_in(yaml, "sigma", 0.0, 10.0);
+  camera.dropout = number_in(yaml, "dropout", 0.0, 1.0);
+  camera.outlier_share = number_in(yaml, "outlier_share", 0.0, 1.0);
+  camera.outlier_size = number_in(yaml, "outlier_size", 0.0, 100.0);
+  camera.T_WK.p = vector(yaml, "position_W");
+  camera.T_WK.R = math::rotation_from_rpy(vector(yaml, "roll_pitch_yaw"));
+  StrictYaml points = yaml.mapping("calibration");
+  camera.points = points.integer("points");
+  if (camera.points < 0 || camera.points > kMaxCalibrationPoints) {
+    points.fail("points",
+                "is " + std::to_string(camera.points) + ", but must be in 0.." + std::to_string(kMaxCalibrationPoints));
+  }
+  camera.point_sigma = number_in(points, "sigma", 0.0, 10.0);
+  camera.points_from_K = vector(points, "from_K");
+  camera.points_to_K = vector(points, "to_K");
+  points.finish();
+  yaml.finish();
+  return camera;
+}
+
 ScheduledCommand command_from(StrictYaml yaml, const Kind& kind) {
   ScheduledCommand command;
   command.period = whole_steps(yaml, "time", kControlPeriod, 100'000'000);
@@ -241,8 +295,19 @@ Scenario scenario_from_text(const std::string& text, const std::string& name, co
   scenario.initial = initial_from(yaml.mapping("initial_state"), kind, robot.model);
   scenario.sensors = sensors_from(yaml.mapping("sensors"), kind);
   for (StrictYaml& command : yaml.mappings("commands")) scenario.commands.push_back(command_from(command, kind));
+  if (kind.with_cup(yaml, {"ball", "camera", "throws"})) {
+    scenario.ball = ball_from(yaml.mapping("ball"), scenario.ball_taken_after);
+    scenario.camera = camera_from(yaml.mapping("camera"));
+    for (StrictYaml& thrown : yaml.mappings("throws")) scenario.throws.push_back(throw_from(thrown));
+  }
   yaml.finish();
 
+  const auto early = [&](const ScheduledThrow& a, const ScheduledThrow& b) {
+    return b.time < a.time + a.flight_time + scenario.ball_taken_after;
+  };
+  if (std::adjacent_find(scenario.throws.begin(), scenario.throws.end(), early) != scenario.throws.end()) {
+    yaml.fail("throws", "must stand in the order of their times, each after the ball before it is taken away");
+  }
   const auto earlier = [](const auto& a, const auto& b) { return a.time < b.time; };
   if (!std::is_sorted(scenario.pushes.begin(), scenario.pushes.end(), earlier)) {
     yaml.fail("pushes", "must stand in the order of their times");

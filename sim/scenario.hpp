@@ -11,6 +11,8 @@
 
 #include "controller/config/robot_description.hpp"
 #include "controller/interface/signals.hpp"
+#include "sim/ball.hpp"
+#include "sim/camera.hpp"
 #include "sim/random_values.hpp"
 #include "sim/terrain.hpp"
 
@@ -58,6 +60,14 @@ struct ScheduledPush {
   Vector3 point_B = Vector3::Zero();  ///< m, where it acts on the base
 };
 
+/// A ball that flies from `from_W` past `aim_W`.
+struct ScheduledThrow {
+  double time = 0.0;                 ///< s
+  double flight_time = 0.0;          ///< s
+  Vector3 from_W = Vector3::Zero();  ///< m
+  Vector3 aim_W = Vector3::Zero();   ///< m, where it is after flight_time
+};
+
 struct ScheduledCommand {
   int period = 0;  ///< control period from whose start it is given, every kUserCommandPeriods
   Behaviour behaviour = Behaviour::kStand;
@@ -85,6 +95,11 @@ struct Scenario {
   SensorModel sensors;
   std::vector<ScheduledPush> pushes;       ///< in order of time
   std::vector<ScheduledCommand> commands;  ///< in order of time, at most one a period
+  // Of a robot with a cup.
+  BallModel ball;
+  double ball_taken_after = 0.0;  ///< s, from a flight's end until the ball is taken away
+  CameraModel camera;
+  std::vector<ScheduledThrow> throws;  ///< in order of time, each after the ball before it is gone
 };
 
 inline constexpr int kUserCommandPeriods = 10;  ///< control periods between two user commands, as programs send them

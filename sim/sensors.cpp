@@ -13,13 +13,6 @@ static_assert(kStateSamples == stance_msgs::robot_state_t::SAMPLES &&
               kMaxJoints == stance_msgs::robot_state_t::MAX_JOINTS &&
               kMaxContacts == stance_msgs::robot_state_t::MAX_CONTACTS);
 
-Vector3 normal3(Random& random) {
-  const double x = random.normal();
-  const double y = random.normal();
-  const double z = random.normal();
-  return {x, y, z};
-}
-
 Vector3 signs3(Random& random) {
   const double x = random.sign();
   const double y = random.sign();

@@ -11,6 +11,7 @@ namespace stance::sim {
 namespace {
 
 using kinematics::Fall;
+using stance_msgs::catch_plan_t;
 using stance_msgs::force_plan_t;
 using stance_msgs::joint_command_t;
 using stance_msgs::push_t;
@@ -18,6 +19,8 @@ using stance_msgs::truth_t;
 using stance_msgs::user_command_t;
 
 constexpr std::int64_t kPeriodUs = 10'000;
+constexpr std::int64_t kStepUs = kPeriodUs / kStepsPerPeriod;
+constexpr std::int64_t kCalibrationPeriods = 100;  ///< from one telling of the calibration's points to the next
 static_assert(kControlPeriod == static_cast<double>(kPeriodUs) * 1e-6);
 static_assert(kMaxContacts == force_plan_t::MAX_CONTACTS && kMaxContacts == truth_t::MAX_CONTACTS &&
               kMaxJoints == truth_t::MAX_JOINTS && kMaxJoints == joint_command_t::MAX_JOINTS);
@@ -87,6 +90,16 @@ Simulator::Simulator(const config::RobotDescription& robot, const Scenario& scen
   setup.floating = num_contacts_ > 0;
   setup.terrain = Terrain(scenario_.terrain, options_.seed);
   setup.initial = initial_state(robot_, scenario_.initial, setup.terrain);
+  if (robot_.cup) {
+    setup.ball = scenario_.ball;
+    camera_.emplace(scenario_.camera, options_.seed);
+    camera_->begin(options_.start_utime, options_.run_id);
+    judge_.emplace(robot_.cup->radius, robot_.cup->depth);
+    throws_.reserve(scenario_.throws.size());
+    for (const ScheduledThrow& one : scenario_.throws) {
+      launch_velocity_.push_back(launch_velocity(scenario_.ball, one.from_W, one.aim_W, one.flight_time));
+    }
+  }
   if (options_.plant.value_or(scenario_.plant) == Plant::kMultibody) {
     world_.emplace(setup);
   } else {
@@ -131,6 +144,12 @@ bool Simulator::accept(const force_plan_t& plan) noexcept {
   newest_plan_seq_ = plan.seq;
   newest_plan_state_seq_ = plan.state_seq;
   plans_.put(plan, step_, scenario_.command_delay_steps);
+  return true;
+}
+
+bool Simulator::accept(const catch_plan_t& plan) noexcept {
+  if (!judge_ || plan.run_id != options_.run_id) return false;
+  judge_->hear(plan);
   return true;
 }
 
@@ -200,6 +219,7 @@ void Simulator::step(Sums& sums) {
   if (world_) {
     torque = drives_damped_ ? damping_torque(robot_.model, robot_.drives.damping, before.qd)
                             : drive_torque(robot_.model, commands_.current, before.q, before.qd);
+    if (robot_.cup) move_ball();
     world_->step(torque, push);
   } else {
     move_single_body(push);
@@ -211,6 +231,9 @@ void Simulator::step(Sums& sums) {
     const bool first = fall_ == Fall::kNone;
     judge_fall(Fall::kBodyOnGround);
     if (first && fallen()) fallen_on_ = robot_.model.bodies[static_cast<std::size_t>(body)].name;
+  }
+  if (world_ && world_->ball()) {
+    judge_->step(options_.start_utime + (step_ + 1) * kStepUs, cup(), world_->ball()->p_W, world_->ball()->v_W);
   }
   sums.torque += torque / kStepsPerPeriod;
   sums.push += push.force / kStepsPerPeriod;
@@ -236,6 +259,55 @@ void Simulator::judge_fall(Fall fall) noexcept {
   } else {
     fall_ = fall;
   }
+}
+
+/// Throws the ball and takes it away as the scenario says.
+void Simulator::move_ball() {
+  const double now = static_cast<double>(step_) * kPhysicsStep;
+  const auto at = [&](double time) { return std::abs(now - time) < 0.5 * kPhysicsStep; };
+  if (world_->ball()) {
+    const ScheduledThrow& one = scenario_.throws[next_throw_ - 1];
+    if (at(one.time + one.flight_time + scenario_.ball_taken_after)) {
+      judge_->end();
+      write_ball_truth();
+      throws_.push_back(ball_truth_);
+      world_->take_ball();
+    }
+  }
+  if (next_throw_ < scenario_.throws.size() && at(scenario_.throws[next_throw_].time)) {
+    world_->throw_ball(scenario_.throws[next_throw_].from_W, launch_velocity_[next_throw_]);
+    judge_->begin();
+    ++next_throw_;
+  }
+}
+
+CupPose Simulator::cup() const noexcept {
+  rigid_body::Kinematics kinematics;
+  rigid_body::forward_kinematics(robot_.model, world_->state(), kinematics);
+  const auto body = static_cast<std::size_t>(robot_.cup->body);
+  return {kinematics.p_W[body] + kinematics.R_W[body] * robot_.cup->position, kinematics.R_W[body].col(2)};
+}
+
+void Simulator::write_ball_truth() noexcept {
+  const CupPose pose = cup();
+  const std::optional<BallState>& ball = world_->ball();
+  ball_truth_.utime = options_.start_utime + period_ * kPeriodUs;
+  ball_truth_.seq = period_ + 1;
+  ball_truth_.run_id = options_.run_id;
+  ball_truth_.throw_number = static_cast<std::int32_t>(next_throw_);
+  ball_truth_.present = ball ? 1 : 0;
+  if (ball) {
+    copy(ball->p_W, ball_truth_.p_WBall);
+    copy(ball->v_W, ball_truth_.v_WBall);
+  }
+  copy(pose.p_W, ball_truth_.p_WCup);
+  copy(pose.axis_W, ball_truth_.axis_WCup);
+  judge_->tell(ball_truth_);
+}
+
+const stance_msgs::calibration_points_t* Simulator::calibration_points() const {
+  return camera_ && scenario_.camera.points > 0 && period_ % kCalibrationPeriods == 0 ? &camera_->calibration_points()
+                                                                                      : nullptr;
 }
 
 void Simulator::write_messages(const Sums& sums) noexcept {
@@ -292,6 +364,12 @@ void Simulator::write_messages(const Sums& sums) noexcept {
   truth_.refused_not_finite = refused().not_finite;
   truth_.refused_order = refused().order;
   truth_.refused_run = refused().run;
+
+  if (camera_) {
+    write_ball_truth();
+    const std::optional<BallState>& ball = world_->ball();
+    camera_->look(period_, utime, ball ? std::optional(ball->p_W) : std::nullopt);
+  }
 
   const auto& commands = scenario_.commands;
   while (next_command_ < commands.size() && commands[next_command_].period <= period_) ++next_command_;

@@ -7,6 +7,10 @@
 #include <array>
 #include <cstdint>
 #include <optional>
+#include <stance_msgs/ball_observation_t.hpp>
+#include <stance_msgs/ball_truth_t.hpp>
+#include <stance_msgs/calibration_points_t.hpp>
+#include <stance_msgs/catch_plan_t.hpp>
 #include <stance_msgs/force_plan_t.hpp>
 #include <stance_msgs/joint_command_t.hpp>
 #include <stance_msgs/push_t.hpp>
@@ -17,6 +21,7 @@
 #include <vector>
 
 #include "controller/config/robot_description.hpp"
+#include "sim/catch_judge.hpp"
 #include "sim/drives.hpp"
 #include "sim/scenario.hpp"
 #include "sim/sensors.hpp"
@@ -42,11 +47,22 @@ class Simulator {
   /// The scenario's command in force, sent again and again as an operator's program would: at this instant, else null.
   const stance_msgs::user_command_t* user_command() const { return user_command_due_ ? &user_command_ : nullptr; }
 
+  // Of a robot with a cup, else null.
+  /// What the camera tells at this instant, or null.
+  const stance_msgs::ball_observation_t* ball_observation() const { return camera_ ? camera_->observation() : nullptr; }
+  /// The same points once a second, for whoever comes late; null at other instants.
+  const stance_msgs::calibration_points_t* calibration_points() const;
+  const stance_msgs::ball_truth_t* ball_truth() const { return camera_ ? &ball_truth_ : nullptr; }
+  /// Every throw that is over, as it was then.
+  const std::vector<stance_msgs::ball_truth_t>& throws() const { return throws_; }
+
   Acceptance accept(const stance_msgs::joint_command_t& command) noexcept;
   /// False where the plan is not of this run, of another robot's size, not finite, or older than one before it.
   bool accept(const stance_msgs::force_plan_t& plan) noexcept;
   /// Whoever says it: a robot that is told to lie down, and whose drives damp for it, has not fallen.
   void hear(const stance_msgs::user_command_t& command) noexcept;
+  /// False where the plan is not of this run. For the judgement of throws alone.
+  bool accept(const stance_msgs::catch_plan_t& plan) noexcept;
   /// Starts now. False where it is not finite, not of this run, or too many are under way.
   bool accept(const stance_msgs::push_t& push) noexcept;
 
@@ -102,6 +118,9 @@ class Simulator {
   void step(Sums& sums);
   Wrench push_wrench(const rigid_body::State& state, double now) const noexcept;
   void judge_fall(kinematics::Fall fall) noexcept;
+  void move_ball();
+  CupPose cup() const noexcept;
+  void write_ball_truth() noexcept;
   void write_messages(const Sums& sums) noexcept;
 
   config::RobotDescription robot_;
@@ -129,6 +148,12 @@ class Simulator {
   bool lying_ = false;
   std::size_t next_command_ = 0;
   bool user_command_due_ = false;
+  std::optional<Camera> camera_;  // these of a robot with a cup
+  std::optional<CatchJudge> judge_;
+  std::vector<Vector3> launch_velocity_;  // m/s, of the scenario's throws
+  std::size_t next_throw_ = 0;
+  stance_msgs::ball_truth_t ball_truth_{};
+  std::vector<stance_msgs::ball_truth_t> throws_;
   stance_msgs::robot_state_t state_{};
   stance_msgs::truth_t truth_{};
   stance_msgs::user_command_t user_command_{};

@@ -75,10 +75,13 @@ struct World::Bullet {
   btMultiBody body;
   std::vector<std::unique_ptr<btMultiBodyLinkCollider>> colliders;
   std::vector<std::unique_ptr<btMultiBodyJointLimitConstraint>> stops;
+  std::unique_ptr<btSphereShape> ball_shape;
+  std::unique_ptr<btRigidBody> ball;
   btMultiBodyDynamicsWorld world{&dispatcher, &broadphase, &solver, &configuration};
 };
 
-World::World(const WorldSetup& setup) : model_(setup.model), feet_(setup.feet), state_(setup.initial) {
+World::World(const WorldSetup& setup)
+    : model_(setup.model), feet_(setup.feet), state_(setup.initial), ball_model_(setup.ball) {
   std::array<PrincipalAxes, rigid_body::kMaxBodies> axes;
   std::transform(model_.bodies.begin(), model_.bodies.begin() + model_.num_bodies(), axes.begin(), principal_axes);
   R_BI_ = axes[0].R_LI;
@@ -98,8 +101,11 @@ World::World(const WorldSetup& setup) : model_(setup.model), feet_(setup.feet), 
   solver.m_linearSlop = 1e-5;
   solver.m_splitImpulse = 0;
 
-  bullet_->ground.setFriction(1.0);
-  bullet_->ground.setRestitution(0.0);
+  // Bullet multiplies what two bodies have: with a ball each has the square root of the pair's.
+  const double restitution = ball_model_ ? std::sqrt(ball_model_->restitution) : 0.0;
+  const double friction = ball_model_ ? std::sqrt(ball_model_->friction) : setup.friction;
+  bullet_->ground.setFriction(ball_model_ ? friction : 1.0);
+  bullet_->ground.setRestitution(restitution);
   world.addRigidBody(&bullet_->ground);
 
   btMultiBody& body = bullet_->body;
@@ -145,8 +151,8 @@ World::World(const WorldSetup& setup) : model_(setup.model), feet_(setup.feet), 
     const bool bare = compound->getNumChildShapes() == 0;
     auto collider = std::make_unique<btMultiBodyLinkCollider>(&body, i - 1);
     collider->setCollisionShape(compound.get());
-    collider->setFriction(setup.friction);
-    collider->setRestitution(0.0);
+    collider->setFriction(friction);
+    collider->setRestitution(restitution);
     if (i == 0) {
       body.setBaseCollider(collider.get());
     } else {
@@ -165,6 +171,17 @@ World::World(const WorldSetup& setup) : model_(setup.model), feet_(setup.feet), 
     stop->finalizeMultiDof();
     world.addMultiBodyConstraint(stop.get());
     bullet_->stops.push_back(std::move(stop));
+  }
+
+  if (ball_model_) {
+    btVector3 moments;
+    bullet_->ball_shape = std::make_unique<btSphereShape>(ball_model_->radius);
+    bullet_->ball_shape->calculateLocalInertia(ball_model_->mass, moments);
+    bullet_->ball = std::make_unique<btRigidBody>(
+        btRigidBody::btRigidBodyConstructionInfo(ball_model_->mass, nullptr, bullet_->ball_shape.get(), moments));
+    bullet_->ball->setFriction(friction);
+    bullet_->ball->setRestitution(restitution);
+    bullet_->ball->setActivationState(DISABLE_DEACTIVATION);
   }
 
   // Bullet's base stands at its centre of mass, along its principal axes, and keeps the inverse rotation.
@@ -192,9 +209,37 @@ void World::step(const JointVector& torque, const Wrench& push) {
   body.addBaseForce(to_bullet(push.force));
   body.addBaseTorque(to_bullet(push.moment + p_com_B_W.cross(push.force)));
   for (int i = 0; i < model_.num_joints; ++i) body.addJointTorque(i, torque[i]);
+  if (ball_) {
+    const Vector3 drag = flight_acceleration(*ball_model_, ball_->v_W) - Vector3(0.0, 0.0, -kGravity);
+    bullet_->ball->applyCentralForce(to_bullet(ball_model_->mass * drag));
+  }
   bullet_->world.stepSimulation(kPhysicsStep, 0);
   read_state();
+  if (ball_) read_ball();
   read_contacts();
+}
+
+void World::throw_ball(const Vector3& p_W, const Vector3& v_W) {
+  take_ball();
+  btRigidBody& ball = *bullet_->ball;
+  ball.setWorldTransform(btTransform(btQuaternion::getIdentity(), to_bullet(p_W)));
+  ball.setInterpolationWorldTransform(ball.getWorldTransform());
+  ball.setLinearVelocity(to_bullet(v_W));
+  ball.setAngularVelocity(btVector3(0.0, 0.0, 0.0));
+  ball.clearForces();
+  bullet_->world.addRigidBody(&ball);
+  read_ball();
+}
+
+void World::take_ball() {
+  if (!ball_) return;
+  bullet_->world.removeRigidBody(bullet_->ball.get());
+  ball_.reset();
+}
+
+void World::read_ball() {
+  const btRigidBody& ball = *bullet_->ball;
+  ball_ = {from_bullet(ball.getWorldTransform().getOrigin()), from_bullet(ball.getLinearVelocity())};
 }
 
 void World::read_state() {

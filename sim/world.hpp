@@ -7,10 +7,12 @@
 // URDF.
 #include <array>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "controller/rigid_body/dynamics.hpp"
 #include "controller/rigid_body/model.hpp"
+#include "sim/ball.hpp"
 #include "sim/terrain.hpp"
 
 namespace stance::sim {
@@ -47,6 +49,13 @@ struct WorldSetup {
   Terrain terrain;
   bool floating = true;  ///< false: the base is fixed where it starts
   rigid_body::State initial;
+  std::optional<BallModel> ball;  ///< where there is one, its restitution and friction are those of all that it meets
+};
+
+/// A ball that is there.
+struct BallState {
+  Vector3 p_W = Vector3::Zero();  ///< m, its centre
+  Vector3 v_W = Vector3::Zero();  ///< m/s
 };
 
 class World {
@@ -58,6 +67,13 @@ class World {
 
   /// One step of kPhysicsStep under joint torques [N m] and a wrench on the base.
   void step(const JointVector& torque, const Wrench& push);
+
+  /// Puts the ball at `p_W` [m] with `v_W` [m/s], wherever it was. Only where the set-up has one.
+  void throw_ball(const Vector3& p_W, const Vector3& v_W);
+  /// Takes it away.
+  void take_ball();
+  /// Nothing while it is not there.
+  const std::optional<BallState>& ball() const { return ball_; }
 
   const rigid_body::State& state() const { return state_; }
   Mechanics mechanics() const noexcept { return sim::mechanics(model_, state_); }
@@ -72,6 +88,7 @@ class World {
   struct Bullet;
   void read_state();
   void read_contacts();
+  void read_ball();
   /// Whose ball the body's shape is; -1 for what is no foot's.
   int foot_of(int body, int shape) const noexcept;
 
@@ -80,6 +97,8 @@ class World {
   std::unique_ptr<Bullet> bullet_;
   Matrix3 R_BI_ = Matrix3::Identity();  // the base's principal axes
   rigid_body::State state_;
+  std::optional<BallModel> ball_model_;
+  std::optional<BallState> ball_;
   ContactVectors foot_force_W_{};
   std::array<int, kMaxContacts> foot_shape_{};  // of each foot's ball among its body's shapes
   int body_on_ground_ = -1;
