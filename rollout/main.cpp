@@ -63,11 +63,15 @@ int main(int argc, char** argv) {
     const auto record = [&](const char* channel, io::Bytes bytes) {
       if (log) log->write(simulator.state().utime, channel, bytes);
     };
-    std::vector<std::uint8_t> state, user_command, truth;
+    std::vector<std::uint8_t> state, bytes;
     const auto record_truth = [&] {
       if (!log) return;
-      io::encode(simulator.truth(), truth);
-      record("TRUTH", truth);
+      io::encode(simulator.truth(), bytes);
+      record("TRUTH", bytes);
+      if (const auto* ball = simulator.ball_truth()) {
+        io::encode(*ball, bytes);
+        record("BALL_TRUTH", bytes);
+      }
     };
     const std::string command_line = platform::command_line(argc, argv);
     record("RUN_INFO_SIMULATOR", sim::encode_run_info(robot, scenario, options, command_line));
@@ -80,9 +84,19 @@ int main(int argc, char** argv) {
     const auto start = std::chrono::steady_clock::now();
     for (std::int64_t k = 0; k < periods && !simulator.fallen(); ++k) {
       if (const auto* command = simulator.user_command()) {
-        io::encode(*command, user_command);
-        record(io::channel::kUserCommand, user_command);
-        static_cast<void>(ticker.offer_user_command(user_command));
+        io::encode(*command, bytes);
+        record(io::channel::kUserCommand, bytes);
+        static_cast<void>(ticker.offer_user_command(bytes));
+      }
+      if (const auto* points = simulator.calibration_points()) {
+        io::encode(*points, bytes);
+        record(io::channel::kCalibrationPoints, bytes);
+        static_cast<void>(ticker.offer_calibration(bytes));
+      }
+      if (const auto* ball = simulator.ball_observation()) {
+        io::encode(*ball, bytes);
+        record(io::channel::kBallObservation, bytes);
+        static_cast<void>(ticker.offer_ball(bytes));
       }
       io::encode(simulator.state(), state);
       record(io::channel::kRobotState, state);
@@ -92,9 +106,12 @@ int main(int argc, char** argv) {
       ticker.tick(1, clock);
       clock.finish();
       for (const auto& [channel, message] : ticker.published()) {
+        if (message.size == 0) continue;
         record(channel, message.bytes());
         if (channel == std::string_view(io::channel::kForcePlan)) {
           simulator.accept(io::decoded<stance_msgs::force_plan_t>(message.bytes()));
+        } else if (channel == std::string_view(io::channel::kCatchPlan)) {
+          simulator.accept(io::decoded<stance_msgs::catch_plan_t>(message.bytes()));
         }
       }
       simulator.accept(io::decoded<stance_msgs::joint_command_t>(ticker.command().bytes()));

@@ -1,6 +1,7 @@
 #include "rollout/summary.hpp"
 
 #include <algorithm>
+#include <array>
 #include <charconv>
 #include <cmath>
 #include <iomanip>
@@ -93,6 +94,39 @@ std::string as_json(const TickCpu& cpu) {
   return out.str();
 }
 
+/// How many there are, how many did well, and why the others did not.
+std::string as_json(const std::vector<ThrowOutcome>& throws) {
+  std::array<int, sim::kNumVerdicts> counts{};
+  int crossed = 0, retained = 0;
+  std::string each, verdicts;
+  for (const ThrowOutcome& one : throws) {
+    ++counts[static_cast<std::size_t>(one.verdict)];
+    crossed += one.crossed ? 1 : 0;
+    retained += one.retained ? 1 : 0;
+    std::ostringstream entry;
+    entry << "{\"time_s\": " << number(one.time) << ", \"verdict\": " << quoted(std::string(name_of(one.verdict)))
+          << ", \"crossed\": " << (one.crossed ? "true" : "false")
+          << ", \"retained\": " << (one.retained ? "true" : "false")
+          << ", \"crossing_offset_m\": " << number(one.crossing_offset)
+          << ", \"crossing_angle_rad\": " << number(one.crossing_angle) << ", \"nearest_m\": " << number(one.nearest)
+          << ", \"plan_ball_error_m\": " << number(one.plan_ball_error)
+          << ", \"plan_cup_error_m\": " << number(one.plan_cup_error) << "}";
+    each += (each.empty() ? "" : ", ") + entry.str();
+  }
+  for (std::size_t i = 1; i < counts.size(); ++i) {
+    verdicts += (verdicts.empty() ? "" : ", ") + quoted(std::string(name_of(static_cast<sim::Verdict>(i)))) + ": " +
+                std::to_string(counts[i]);
+  }
+  const auto share = [&](int count) {
+    return throws.empty() ? std::string("null")
+                          : number(static_cast<double>(count) / static_cast<double>(throws.size()));
+  };
+  std::ostringstream out;
+  out << "{\"throws\": " << throws.size() << ", \"crossed\": " << share(crossed)
+      << ", \"retained\": " << share(retained) << ", \"verdicts\": {" << verdicts << "}, \"each\": [" << each << "]}";
+  return out.str();
+}
+
 }  // namespace
 
 std::vector<Segment> segments(const std::vector<sim::ScheduledCommand>& commands, std::span<const Place> path) {
@@ -155,6 +189,7 @@ std::string as_json(const Summary& s) {
         << ", \"qp_failures\": " << s.qp_failures << ", \"qp_iterations_max\": " << s.qp_iterations_max
         << ", \"steps\": " << s.steps << ", \"p_WB\": " << list(s.p_WB) << ", \"segments\": [" << parts << "]";
   }
+  if (s.has_cup) out << ", \"catch\": " << as_json(s.throws);
   out << ", \"max_torque_share\": " << number(s.max_torque_share) << ", \"torques_saturated\": " << s.torques_saturated
       << ", \"drives_damped_s\": " << number(s.drives_damped) << ", \"tick_cpu\": " << as_json(s.tick_cpu)
       << ", \"command_hash\": \"" << std::hex << s.command_hash << "\"}\n";
@@ -178,6 +213,10 @@ std::string as_text(const Summary& s) {
       << s.tick_cpu.p50 << " us (median), " << s.tick_cpu.p99_9 << " us (99.9%); " << s.duration / s.wall
       << " times real time; joint commands " << std::hex << s.command_hash << std::dec << "\n";
   out << std::fixed << std::setprecision(2);
+  for (const ThrowOutcome& one : s.throws) {
+    out << "  thrown at " << one.time << " s: " << name_of(one.verdict) << "; it passed "
+        << 1000.0 * one.crossing_offset << " mm from the cup's axis at " << degrees * one.crossing_angle << " deg\n";
+  }
   for (const Segment& segment : s.segments) {
     if (segment.wanted.silent || segment.wanted.behaviour != Behaviour::kWalk) continue;
     out << "  " << segment.start << " to " << segment.end << " s: wanted (" << segment.wanted.velocity.x() << ", "
@@ -235,6 +274,13 @@ Summary Observer::summary(std::uint64_t seed, double wall) const {
   summary.fallen_on = simulator_.fallen_on();
   summary.lying = simulator_.lying();
   summary.p_WB = {truth.p_WB[0], truth.p_WB[1], truth.p_WB[2]};
+  summary.has_cup = simulator_.ball_truth() != nullptr;
+  for (const auto& ball : simulator_.throws()) {
+    summary.throws.push_back({scenario_.throws[static_cast<std::size_t>(ball.throw_number - 1)].time,
+                              static_cast<sim::Verdict>(ball.verdict), ball.crossed != 0, ball.retained != 0,
+                              ball.crossing_offset, ball.crossing_angle, ball.nearest, ball.plan_ball_error,
+                              ball.plan_cup_error});
+  }
   if (summary.has_feet) summary.segments = segments(scenario_.commands, path_);
   summary.tick_cpu = tick_cpu(cpu_us_);
   return summary;

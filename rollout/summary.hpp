@@ -47,6 +47,19 @@ struct TickCpu {
 /// Of `times` [us]; all zero where there is none.
 TickCpu tick_cpu(std::vector<double> times);
 
+/// What became of a ball thrown at a robot with a cup.
+struct ThrowOutcome {
+  double time = 0.0;  ///< s, of the throw
+  sim::Verdict verdict = sim::Verdict::kOpen;
+  bool crossed = false;          ///< the cup's plane, as asked
+  bool retained = false;         ///< in the cup
+  double crossing_offset = 0.0;  ///< m, infinity where it did not come by
+  double crossing_angle = 0.0;   ///< rad
+  double nearest = 0.0;          ///< m
+  double plan_ball_error = 0.0;  ///< m, NaN without a plan
+  double plan_cup_error = 0.0;   ///< m, the same
+};
+
 struct Summary {
   std::uint64_t seed = 0;
   std::vector<sim::DrawnValue> drawn;
@@ -60,6 +73,8 @@ struct Summary {
   double max_torque_share = 0.0;       ///< of a joint's limit, mean over a control period
   double drives_damped = 0.0;          ///< s, without a valid command
   std::int64_t torques_saturated = 0;  ///< ticks that clipped one
+  bool has_cup = false;
+  std::vector<ThrowOutcome> throws;  ///< that are over
   std::int64_t qp_failures = 0;
   int qp_iterations_max = 0;
   std::int64_t steps = 0;  ///< swings that ended in stance
