@@ -149,6 +149,7 @@ const InterceptionPlan& Interception::update(double now, const BallState& ball, 
         best.status = slack >= 0.0 ? InterceptionStatus::kPlanned : InterceptionStatus::kTime;
         best.time = time;
         best.p_ABall = then.p_A;
+        best.v_ABall = then.v_A;
         best.offset = offset;
         best.q = q;
         best.slack = slack;
@@ -173,6 +174,7 @@ void Interception::follow(double now, const BallState& ball, const JointMotion& 
     least = change;
     plan_.q = q;
     plan_.p_ABall = then.p_A;
+    plan_.v_ABall = then.v_A;
     plan_.slack = left - time_needed(motion_limits_, kJoints, motion, q);
   });
 }

@@ -62,6 +62,7 @@ struct InterceptionPlan {
   InterceptionStatus status = InterceptionStatus::kReach;
   double time = 0.0;                    ///< s, of the caller's clock
   Vector3 p_ABall = Vector3::Zero();    ///< m, where the ball will be
+  Vector3 v_ABall = Vector3::Zero();    ///< m/s, the same
   double offset = 0.0;                  ///< rad, of the pitch
   JointVector q = JointVector::Zero();  ///< rad, the posture that meets it
   double slack = 0.0;                   ///< s, left less needed

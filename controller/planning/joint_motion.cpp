@@ -6,14 +6,13 @@
 namespace stance::planning {
 namespace {
 
-constexpr double kLeastTime = 0.02;  ///< s: a quintic over less is all rounding
-
-/// One joint's quintic, from (q, v, a) to (target, 0, 0) in T.
+/// One joint's quintic, from (q, v, a) to (target, speed, 0) in T.
 struct Quintic {
   double q, v, a, c3, c4, c5;
 
-  Quintic(double q_0, double v_0, double a_0, double target, double T) noexcept : q(q_0), v(v_0), a(a_0) {
-    const double d = target - q - v * T - 0.5 * a * T * T, dv = -v - a * T, da = -a;
+  Quintic(double q_0, double v_0, double a_0, double target, double end_speed, double T) noexcept
+      : q(q_0), v(v_0), a(a_0) {
+    const double d = target - q - v * T - 0.5 * a * T * T, dv = end_speed - v - a * T, da = -a;
     c3 = (10.0 * d - 4.0 * dv * T + 0.5 * da * T * T) / (T * T * T);
     c4 = (-15.0 * d + 7.0 * dv * T - da * T * T) / (T * T * T * T);
     c5 = (6.0 * d - 3.0 * dv * T + 0.5 * da * T * T) / (T * T * T * T * T);
@@ -46,26 +45,38 @@ double braking_speed(double e, double max_speed, double max_acceleration, double
 
 }  // namespace
 
-void advance(const JointMotionLimits& limits, int joints, const JointVector& target, double time_left, double dt,
-             JointMotion& motion) noexcept {
+void advance(const JointMotionLimits& limits, int joints, const JointVector& target, const JointVector& speed,
+             double time_left, double dt, JointMotion& motion) noexcept {
   for (int i = 0; i < joints; ++i) {
     double &q = motion.q[i], &v = motion.v[i], &a = motion.a[i];
     const double max_speed = limits.speed[i], max_acceleration = limits.acceleration[i];
-    const double T = std::max(time_left, kLeastTime);
-    const Quintic way(q, v, a, target[i], T);
+    const double T = std::max(time_left, dt);
+    const Quintic way(q, v, a, target[i], speed[i], T);
     if (way.keeps_to(max_speed, max_acceleration, T)) {
       // Past its end a quintic goes anywhere.
       const bool ends = dt >= T;
       q = ends ? target[i] : way.position(dt);
-      v = ends ? 0.0 : way.speed(dt);
+      v = ends ? speed[i] : way.speed(dt);
       a = ends ? 0.0 : way.acceleration(dt);
       continue;
     }
-    const double wanted = braking_speed(target[i] - q - 0.5 * v * dt, max_speed, max_acceleration, dt);
+    // Where the line to the target is half a step on.
+    const double e = target[i] - speed[i] * std::max(time_left - 0.5 * dt, 0.0) - q - 0.5 * v * dt;
+    const double wanted =
+        std::clamp(speed[i] + braking_speed(e, max_speed, max_acceleration, dt), -max_speed, max_speed);
     a = std::clamp((wanted - v) / dt, -max_acceleration, max_acceleration);
     q += v * dt + 0.5 * a * dt * dt;
     v += a * dt;
   }
+}
+
+bool keeps_to_limits(const JointMotionLimits& limits, int joints, const JointVector& target, const JointVector& speed,
+                     double time_left, const JointMotion& motion) noexcept {
+  for (int i = 0; i < joints; ++i) {
+    const Quintic way(motion.q[i], motion.v[i], motion.a[i], target[i], speed[i], time_left);
+    if (!way.keeps_to(limits.speed[i], limits.acceleration[i], time_left)) return false;
+  }
+  return true;
 }
 
 double time_needed(const JointMotionLimits& limits, int joints, const JointMotion& motion,

@@ -1,13 +1,14 @@
 #pragma once
-// How joints go from where they are to rest at a target, within limits of speed and acceleration, decided anew each
-// tick. Nothing here allocates or throws.
+// How joints go from where they are to a target, there with a wanted speed and no acceleration, within limits of speed
+// and acceleration, decided anew each tick. Nothing here allocates or throws.
 //
-// With time T left, a joint at (q, v, a) follows the quintic that ends at (target, 0, 0):
-//   q(t) = q + v t + a t^2/2 + c3 t^3 + c4 t^4 + c5 t^5,      d = target - q - v T - a T^2/2, dv = -v - a T, da = -a
-//   c3 = (10 d - 4 dv T + da T^2/2) / T^3    c4 = (-15 d + 7 dv T - da T^2) / T^4    c5 = (6 d - 3 dv T + da T^2/2) /
-//   T^5
-// Where that would pass a limit on its way, or no time is left, the joint instead takes the speed from which it can
-// still stop at the target, sqrt(2 b |e|) with b a share of its acceleration: as fast as it may, late or not.
+// With time T left, a joint at (q, v, a) follows the quintic that ends at (target, speed, 0):
+//   q(t) = q + v t + a t^2/2 + c3 t^3 + c4 t^4 + c5 t^5,      d = target - q - v T - a T^2/2, dv = speed - v - a T, da
+//   = -a c3 = (10 d - 4 dv T + da T^2/2) / T^3    c4 = (-15 d + 7 dv T - da T^2) / T^4    c5 = (6 d - 3 dv T + da
+//   T^2/2) / T^5
+// Where that would pass a limit on its way, or no time is left, the joint instead makes for the line along which it
+// would come to the target with that speed, over it by the speed from which it can still stop there, sqrt(2 b |e|) with
+// b a share of its acceleration: as fast as it may, late or not.
 // From rest to rest over a distance d the quintic's peaks are 15/8 d/T and 10/sqrt(3) d/T^2: the time that it needs.
 #include "controller/interface/signals.hpp"
 
@@ -25,10 +26,14 @@ struct JointMotion {
   JointVector a = JointVector::Zero();  ///< rad/s^2
 };
 
-/// `motion` a time `dt` (s, > 0) on, on its way to rest at `target` in `time_left` (s, of any sign). Of the first
-/// `joints`.
-void advance(const JointMotionLimits& limits, int joints, const JointVector& target, double time_left, double dt,
-             JointMotion& motion) noexcept;
+/// `motion` a time `dt` (s, > 0) on, on its way to `target` [rad] with `speed` [rad/s] in `time_left` (s, of any sign).
+/// Of the first `joints`.
+void advance(const JointMotionLimits& limits, int joints, const JointVector& target, const JointVector& speed,
+             double time_left, double dt, JointMotion& motion) noexcept;
+
+/// Does the quintic from `motion` to `target` with `speed` in `time_left` (s, > 0) keep to the limits?
+bool keeps_to_limits(const JointMotionLimits& limits, int joints, const JointVector& target, const JointVector& speed,
+                     double time_left, const JointMotion& motion) noexcept;
 
 /// s that the quintic needs from `motion` to rest at `target`, near enough to compare targets by.
 double time_needed(const JointMotionLimits& limits, int joints, const JointMotion& motion,

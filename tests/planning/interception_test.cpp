@@ -1,0 +1,133 @@
+#include "controller/planning/interception.hpp"
+
+#include <catch2/catch_test_macros.hpp>
+#include <cmath>
+#include <numbers>
+#include <random>
+
+#include "controller/config/catcher_config_yaml.hpp"
+
+namespace stance::planning {
+namespace {
+
+struct Arm {
+  config::RobotDescription robot = config::load_robot(config::share_directory() / "robots", "catcher");
+  behaviours::CatcherConfig config = config::catcher_config(robot);
+  kinematics::Arm5Geometry geometry = kinematics::arm5_geometry(robot.model, config.tool);
+  kinematics::Arm5Limits limits = kinematics::arm5_limits(robot.model);
+
+  Interception interception() const { return {config.planner, geometry, limits, config.motion}; }
+  JointMotion at_its_place() const {
+    JointMotion motion;
+    motion.q = config.place;
+    return motion;
+  }
+  RigidTransform cup(const JointVector& q) const { return kinematics::arm5_forward(geometry, q.head<5>()); }
+};
+
+/// A ball that is at `aim` after `time`, thrown from `from`.
+BallState thrown(const Vector3& from, const Vector3& aim, double time) {
+  return {from, (aim - from) / time + 0.5 * time * Vector3(0.0, 0.0, kGravity), 0.0};
+}
+
+}  // namespace
+
+TEST_CASE("ABallInFlightFallsAsFreeBodiesDoAndDragSlowsIt") {
+  BallState free{{0.0, 0.0, 1.0}, {3.0, 1.0, 2.0}, 0.0}, slowed{free.p_A, free.v_A, 0.02};
+  for (int k = 0; k < 50; ++k) {
+    free.coast(0.01);
+    slowed.coast(0.01);
+  }
+  CHECK((free.p_A - Vector3(1.5, 0.5, 1.0 + 1.0 - 0.125 * kGravity)).norm() < 1e-12);
+  CHECK((free.v_A - Vector3(3.0, 1.0, 2.0 - 0.5 * kGravity)).norm() < 1e-12);
+  CHECK(slowed.v_A.norm() < free.v_A.norm());
+}
+
+TEST_CASE("ABallThroughTheArmsReachIsMetByACupThatFacesIt") {
+  const Arm arm;
+  Interception interception = arm.interception();
+  std::mt19937 random(3);
+  std::uniform_real_distribution<double> aside(-0.15, 0.15), distance(2.5, 4.5);
+  for (int trial = 0; trial < 50; ++trial) {
+    const Vector3 aim(0.55 + aside(random), aside(random), 0.8 + aside(random));
+    const BallState ball = thrown({distance(random), aside(random), 1.2}, aim, 0.8);
+    interception.reset();
+    const InterceptionPlan plan = interception.update(10.0, ball, arm.at_its_place());
+    REQUIRE(plan.status == InterceptionStatus::kPlanned);
+    BallState then = ball;
+    then.coast(plan.time - 10.0);
+    CHECK((then.p_A - plan.p_ABall).norm() < 1e-9);
+    const RigidTransform cup = arm.cup(plan.q);
+    CHECK((cup.p - plan.p_ABall).norm() <= arm.config.planner.reach_slack + 1e-9);
+    const double facing = std::acos(-cup.R.col(2).dot(plan.v_ABall.normalized()));
+    CHECK(facing < 51.0 / 180.0 * std::numbers::pi);
+    for (int i = 0; i < 5; ++i) {
+      CHECK(plan.q[i] >= arm.limits.lower(i) + arm.config.planner.limit_margin - 1e-9);
+      CHECK(plan.q[i] <= arm.limits.upper(i) - arm.config.planner.limit_margin + 1e-9);
+    }
+  }
+}
+
+TEST_CASE("ABallThatPassesOutOfReachIsNotPlannedFor") {
+  const Arm arm;
+  Interception interception = arm.interception();
+  const auto plan = interception.update(0.0, thrown({3.0, 2.0, 1.0}, {0.0, 2.0, 1.0}, 0.8), arm.at_its_place());
+  CHECK(plan.status == InterceptionStatus::kReach);
+  CHECK_FALSE(plan.exists());
+}
+
+TEST_CASE("ABallBarelyOutOfReachIsMetFromShortOfIt") {
+  Arm arm;
+  arm.config.planner.reach_slack = 0.0;
+  // Falling past the farthest point at the shoulder's height: the cup lies along the arm's plane.
+  const auto passing = [](double radius) { return BallState{{radius, 0.0, 3.0}, {0.0, 0.0, -1.0}, 0.0}; };
+  const auto farthest = [&] {
+    double reached = 0.5;
+    for (double radius = 0.5; radius < 1.2; radius += 0.001) {
+      Interception interception = arm.interception();
+      if (!interception.update(0.0, passing(radius), arm.at_its_place()).exists()) break;
+      reached = radius;
+    }
+    return reached;
+  };
+  const double strict = farthest();
+  arm.config.planner.reach_slack = 0.03;
+  const double slack = farthest();
+  CHECK(slack > strict + 0.02);
+  CHECK(slack < strict + 0.05);
+}
+
+TEST_CASE("ALateArmGoesAllTheSameAndSaysSo") {
+  const Arm arm;
+  Interception interception = arm.interception();
+  JointMotion away;
+  away.q.head<5>() << -2.5, 0.5, 2.0, 0.0, 0.0;
+  const auto plan = interception.update(0.0, thrown({1.2, 0.0, 1.0}, {0.5, 0.0, 0.8}, 0.12), away);
+  CHECK(plan.status == InterceptionStatus::kTime);
+  CHECK(plan.exists());
+  CHECK(plan.slack < 0.0);
+}
+
+TEST_CASE("FromItsCommitmentOnAPlanKeepsItsTimeAndFollowsTheBall") {
+  const Arm arm;
+  Interception interception = arm.interception();
+  BallState ball = thrown({3.5, 0.0, 1.2}, {0.55, 0.0, 0.8}, 0.8);
+  const double time = interception.update(0.0, ball, arm.at_its_place()).time;
+  double now = 0.0;
+  bool committed = false;
+  while (now + 0.02 < time) {
+    now += 0.01;
+    ball.coast(0.01);
+    if (committed) ball.p_A.y() += 0.001;  // the estimate moves
+    const double before = interception.plan().time;
+    const InterceptionPlan& plan = interception.update(now, ball, arm.at_its_place());
+    if (!plan.committed) continue;
+    if (committed) CHECK(plan.time == before);
+    committed = true;
+    CHECK((arm.cup(plan.q).p - plan.p_ABall).norm() < 1e-9);
+  }
+  CHECK(committed);
+  CHECK(interception.plan().p_ABall.y() > 0.003);
+}
+
+}  // namespace stance::planning

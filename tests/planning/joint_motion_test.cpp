@@ -1,0 +1,83 @@
+#include "controller/planning/joint_motion.hpp"
+
+#include <catch2/catch_test_macros.hpp>
+#include <cmath>
+#include <random>
+
+namespace stance::planning {
+namespace {
+
+constexpr int kJoints = 5;
+constexpr double kStep = 0.01;  // s
+
+JointMotionLimits limits() {
+  JointMotionLimits out;
+  out.speed.head<kJoints>() << 4.5, 4.5, 6.0, 8.0, 8.0;
+  out.acceleration.head<kJoints>() << 30.0, 30.0, 45.0, 60.0, 60.0;
+  return out;
+}
+
+}  // namespace
+
+TEST_CASE("WhereTimeIsEnoughEveryJointArrivesOnTimeWithTheSpeedThatIsWanted") {
+  JointMotion motion;
+  JointVector target = JointVector::Zero(), speed = JointVector::Zero();
+  target.head<kJoints>() << 0.5, -0.8, 1.0, -1.2, 0.3;
+  speed.head<kJoints>() << 0.5, -1.0, 0.0, 2.0, -0.5;
+  for (int k = 80; k > 0; --k) advance(limits(), kJoints, target, speed, k * kStep, kStep, motion);
+  CHECK((motion.q - target).norm() < 1e-9);
+  CHECK((motion.v - speed).norm() < 1e-9);
+}
+
+TEST_CASE("NoJointPassesItsSpeedOrItsAccelerationWhateverIsAskedAndWheneverItChanges") {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<double> place(-2.5, 2.5), time(-0.2, 0.8), rate(-3.0, 3.0);
+  const JointMotionLimits allowed = limits();
+  for (int trial = 0; trial < 200; ++trial) {
+    JointMotion motion;
+    for (int change = 0; change < 6; ++change) {
+      JointVector target = JointVector::Zero(), speed = JointVector::Zero();
+      for (int i = 0; i < kJoints; ++i) {
+        target[i] = place(random);
+        speed[i] = change % 2 == 0 ? 0.0 : rate(random);
+      }
+      double left = time(random);
+      for (int k = 0; k < 20; ++k, left -= kStep) {
+        const JointMotion before = motion;
+        advance(allowed, kJoints, target, speed, left, kStep, motion);
+        for (int i = 0; i < kJoints; ++i) {
+          CHECK(std::abs(motion.v[i]) <= 1.001 * allowed.speed[i]);
+          CHECK(std::abs(motion.v[i] - before.v[i]) / kStep <= 1.05 * allowed.acceleration[i]);
+        }
+      }
+    }
+  }
+}
+
+TEST_CASE("WhereTimeIsShortAJointIsLateAndThenAtRest") {
+  JointMotion motion;
+  JointVector target = JointVector::Zero();
+  target[0] = 2.0;
+  const JointVector rest = JointVector::Zero();
+  double left = 0.1;
+  int steps = 0;
+  for (; steps < 200 && (std::abs(motion.q[0] - 2.0) > 1e-4 || std::abs(motion.v[0]) > 1e-3); ++steps, left -= kStep) {
+    advance(limits(), kJoints, target, rest, left, kStep, motion);
+    CHECK(motion.q[0] < 2.0 + 1e-3);
+  }
+  // The fastest way takes 2 / 4.5 + 4.5 / 30 s.
+  CHECK(steps * kStep > 0.59);
+  CHECK(steps * kStep < 0.9);
+}
+
+TEST_CASE("TheTimeNeededIsWhatTheQuinticTakesFromRest") {
+  JointMotion motion;
+  JointVector target = JointVector::Zero();
+  target[1] = 1.0;
+  const double needed = time_needed(limits(), kJoints, motion, target);
+  CHECK(std::abs(needed - std::max(1.875 / 4.5, std::sqrt(5.7735026918962582 / 30.0))) < 1e-12);
+  motion.v[1] = 2.0;
+  CHECK(time_needed(limits(), kJoints, motion, target) < needed);
+}
+
+}  // namespace stance::planning
