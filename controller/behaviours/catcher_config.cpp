@@ -10,21 +10,23 @@ void CatcherConfig::validate() const {
   filter.validate();
   planner.validate();
   fault_ladder.validate();
-  validation.validate();
+  intake.validate();
   const Require require{""};
   const auto above = [&](double value, const char* field, double least, const char* range) {
     require(std::isfinite(value) && value > least, field, value, range);
   };
-  require(user_command_timeout >= kControlPeriod, "user_command_timeout", user_command_timeout, ">= 0.01 s");
   above(max_calibration_rms, "calibration.max_rms", 0.0, "> 0 m");
   above(track.gate, "filter.gate", 1.0, "> 1, the mean of the NIS");
   require(track.max_rejected >= 1, "filter.max_rejected", track.max_rejected, ">= 1");
   above(track.max_gap, "filter.max_gap", 0.0, "> 0 s");
   require(track.min_observations >= 2, "filter.min_observations", track.min_observations, ">= 2");
   require(track.clear_of_cup >= 0.0, "filter.clear_of_cup", track.clear_of_cup, ">= 0 m");
-  require(course.arrive_early >= 0.0 && course.arrive_early < planner.commit, "catch.arrive_early", course.arrive_early,
-          "in 0 .. planner.commit");
-  require(course.settle >= 0.0, "catch.settle", course.settle, ">= 0 s");
+  require(course.give >= 0.0 && course.give < 1.0, "catch.give", course.give, "in 0..1");
+  require(course.max_give >= 0.0, "catch.max_give", course.max_give, ">= 0 m/s");
+  require(course.give_sigma >= 0.0, "catch.give_sigma", course.give_sigma, ">= 0 m");
+  require(course.run_up > 0.0 && course.run_up <= planner.commit, "catch.run_up", course.run_up,
+          "> 0 s, at most planner.commit");
+  above(course.settle, "catch.settle", 0.0, "> 0 s");
   above(course.upright_time, "catch.upright_time", 0.0, "> 0 s");
   require(course.hold_time >= course.settle, "catch.hold_time", course.hold_time, ">= catch.settle");
   above(course.return_time, "catch.return_time", 0.0, "> 0 s");

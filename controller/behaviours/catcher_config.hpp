@@ -3,7 +3,7 @@
 #include "controller/estimation/ball_filter.hpp"
 #include "controller/planning/interception.hpp"
 #include "controller/safety/fault_ladder.hpp"
-#include "controller/safety/validation.hpp"
+#include "controller/safety/intake.hpp"
 
 namespace stance::behaviours {
 
@@ -18,8 +18,12 @@ struct BallTrackConfig {
 
 /// The catch's course in time.
 struct CatchConfig {
-  double arrive_early = 0.0;  ///< s before the ball
-  double settle = 0.0;        ///< s after it, for which the cup stays
+  double give = 0.0;          ///< of the ball's velocity, with which the cup yields to it
+  double max_give = 0.0;      ///< m/s, the most of that
+  double give_sigma = 0.0;    ///< m, of the ball's place at the meeting, each axis, above which it does not: a cup that
+                              ///< gives way follows a new estimate less nimbly
+  double run_up = 0.0;        ///< s before the meeting, in which the cup takes up that velocity
+  double settle = 0.0;        ///< s from the meeting to rest
   double upright_time = 0.0;  ///< s, then, to turn the cup up
   double hold_time = 0.0;     ///< s with the ball
   double return_time = 0.0;   ///< s, back to where it waits
@@ -32,8 +36,8 @@ struct ComputedTorqueConfig {
 };
 
 struct CatcherConfig {
-  double user_command_timeout = 0.0;  ///< s without a user command, after which it waits and catches nothing
-  double max_calibration_rms = 0.0;   ///< m
+  safety::IntakeConfig intake;
+  double max_calibration_rms = 0.0;  ///< m
   estimation::BallFilterConfig filter;
   BallTrackConfig track;
   planning::InterceptionConfig planner;
@@ -41,7 +45,6 @@ struct CatcherConfig {
   CatchConfig course;
   ComputedTorqueConfig computed_torque;
   safety::FaultLadderConfig fault_ladder;
-  safety::ValidationConfig validation;
   JointVector damping = JointVector::Zero();  ///< N m s/rad, of the joints while damped
   JointVector place = JointVector::Zero();    ///< rad, where it waits
   double tool = 0.0;                          ///< m, d5: from the wrist to the cup's centre along the last link's z

@@ -15,6 +15,12 @@ using calibration::Status;
 using planning::InterceptionPlan;
 using planning::InterceptionStatus;
 
+constexpr int kMostPeriods = 10;  // that one tick makes good, after a stall
+
+bool offers(const UserCommand& command) noexcept {
+  return command.behaviour == Behaviour::kStand || command.behaviour == Behaviour::kCatch;
+}
+
 static_assert(kMaxCalibrationPoints == calibration::kMaxPoints);
 
 double seconds(std::int64_t from_us, std::int64_t to_us) noexcept {
@@ -57,8 +63,10 @@ CatcherController::CatcherController(const CatcherConfig& config, const rigid_bo
     : config_(config),
       model_(model),
       tree_(rigid_body::screw_tree(model)),
+      cup_(rigid_body::tip_on_link(model, model.num_joints, {Matrix3::Identity(), {0.0, 0.0, config.tool}})),
       arm_(kinematics::arm5_geometry(model, config.tool)),
       ladder_(config.fault_ladder),
+      intake_(config.intake, model_, 0, offers),
       track_(config.track, config.filter),
       interception_(config.planner, arm_, kinematics::arm5_limits(model), config.motion) {
   config_.validate();
@@ -67,27 +75,29 @@ CatcherController::CatcherController(const CatcherConfig& config, const rigid_bo
 
 void CatcherController::start_run(std::int64_t run_id) noexcept {
   memory_ = Memory{};
-  memory_.run_id = run_id;
   give_up(SafetyMode::kDamp, memory_.last);
   ladder_ = safety::FaultLadder(config_.fault_ladder);
+  intake_.start_run(run_id);
   track_ = BallTrack(config_.track, config_.filter);
   interception_.reset();
 }
 
 void CatcherController::step(const TickInput& input, StageClock& clock, TickOutput& out) noexcept {
-  const std::int64_t before = memory_.state_utime;
-  const bool fresh = accept(input);
+  if (intake_.starts_run(input.state)) start_run(input.state.run_id);
+  const bool fresh = intake_.accept(input, ladder_);
   clock.stamp(Stage::kValidate);
 
   out = memory_.last;
   Trace& trace = out.trace;
   trace.torques_clipped = 0;
   out.ball.updated = false;
-  calibrate(input.calibration, out.catching);
+  memory_.periods += input.periods;
+  calibrate(input, out.catching);
   observe(input, out.ball, out.catching);
   clock.stamp(Stage::kEstimate);
   if (fresh) {
-    const double dt = memory_.moving ? std::min(seconds(before, input.state.utime), 0.1) : 0.0;
+    const double dt = kControlPeriod * std::min(memory_.periods, kMostPeriods);
+    memory_.periods = 0;
     plan(input.state, dt, out.catching);
     move(input.state, dt, out.catching);
     clock.stamp(Stage::kPlan);
@@ -108,61 +118,14 @@ void CatcherController::step(const TickInput& input, StageClock& clock, TickOutp
   trace.safety = mode;
   trace.faults = ladder_.faults();
   trace.fault_count = ladder_.counts();
-  trace.behaviour = memory_.user_command.behaviour;
+  trace.behaviour = intake_.user_command().behaviour;
   memory_.last = out;
   clock.stamp(Stage::kSafety);
 }
 
-bool CatcherController::accept(const TickInput& input) noexcept {
-  const RobotState& state = input.state;
-  if (starts_run(memory_.run_id, memory_.state_seq, state)) start_run(state.run_id);
-  if (input.operator_stop) ladder_.report(Fault::kOperatorStop);
-
-  take_command(input);
-  if (!input.state_is_new) {
-    ladder_.report(Fault::kStateStale);
-    return false;
-  }
-  if (!follows(state) || !safety::state_is_plausible(config_.validation, model_, 0, state)) {
-    ladder_.report(Fault::kStateInvalid);
-    return false;
-  }
-  memory_.state_seq = state.seq;
-  memory_.state_utime = state.utime;
-  return true;
-}
-
-void CatcherController::take_command(const TickInput& input) noexcept {
-  const UserCommand& command = input.user_command;
-  UserCommand& taken = memory_.user_command;
-  memory_.user_command_age += input.periods;
-  if (command.seq != taken.seq) {
-    const bool offered = command.behaviour == Behaviour::kStand || command.behaviour == Behaviour::kCatch;
-    if (safety::command_is_plausible(command) && offered) {
-      taken = command;
-      memory_.user_command_age = 0;
-    } else {
-      taken.seq = command.seq;
-      ladder_.report(Fault::kCommandInvalid);
-    }
-  }
-  if (kControlPeriod * static_cast<double>(memory_.user_command_age) > config_.user_command_timeout) {
-    taken.behaviour = Behaviour::kStand;
-  }
-}
-
-bool CatcherController::follows(const RobotState& state) const noexcept {
-  if (state.seq <= memory_.state_seq || state.utime <= memory_.state_utime) return false;
-  if (memory_.state_seq == 0) return true;
-  // A number or a stamp far off would make every later state one out of order.
-  constexpr double period_us = kControlPeriod * 1e6;
-  const double periods = static_cast<double>(state.seq) - static_cast<double>(memory_.state_seq);
-  const double elapsed_us = static_cast<double>(state.utime) - static_cast<double>(memory_.state_utime);
-  return std::abs(elapsed_us - periods * period_us) < 0.5 * period_us;
-}
-
-void CatcherController::calibrate(const CalibrationPoints& points, CatchPlan& plan) noexcept {
-  if (points.seq == memory_.calibration_seq || points.run_id != memory_.run_id) return;
+void CatcherController::calibrate(const TickInput& input, CatchPlan& plan) noexcept {
+  const CalibrationPoints& points = input.calibration;
+  if (points.seq == memory_.calibration_seq || points.run_id != input.state.run_id) return;
   memory_.calibration_seq = points.seq;
   const auto count = static_cast<std::size_t>(std::clamp(points.num_points, 0, kMaxCalibrationPoints));
   const auto fit = calibration::calibrate(calibration::Kind::kRigid, std::span(points.p_K).first(count),
@@ -179,7 +142,7 @@ void CatcherController::calibrate(const CalibrationPoints& points, CatchPlan& pl
 
 void CatcherController::observe(const TickInput& input, BallEstimate& ball, CatchPlan& plan) noexcept {
   const BallObservation& seen = input.ball;
-  const bool usable = input.ball_is_new && seen.run_id == memory_.run_id && seen.utime > memory_.ball_utime &&
+  const bool usable = input.ball_is_new && seen.run_id == input.state.run_id && seen.utime > memory_.ball_utime &&
                       seen.utime <= input.state.utime && seen.p_K.allFinite();
   if (!usable || !seen.valid || plan.phase == CatchPhase::kUncalibrated) return;
   memory_.ball_utime = seen.utime;
@@ -210,7 +173,7 @@ void CatcherController::enter(CatchPhase phase, CatchPlan& plan) noexcept {
 
 void CatcherController::plan(const RobotState& state, double dt, CatchPlan& plan) noexcept {
   memory_.phase_time += dt;
-  const bool wanted = memory_.user_command.behaviour == Behaviour::kCatch;
+  const bool wanted = intake_.user_command().behaviour == Behaviour::kCatch;
   const bool in_flight = track_.is_known(state.utime);
   switch (plan.phase) {
     case CatchPhase::kUncalibrated:
@@ -236,21 +199,26 @@ void CatcherController::plan(const RobotState& state, double dt, CatchPlan& plan
       break;
   }
   if (plan.phase == CatchPhase::kCatching) {
-    intercept(state, plan);
+    intercept(state, dt, plan);
   } else if (plan.phase == CatchPhase::kReturning && memory_.phase_time == 0.0) {
     track_.reset();
     interception_.reset();
+    memory_.give.setZero();
+    memory_.running_up = false;
     plan.status = CatchStatus::kNone;
     plan.committed = false;
     plan.observations = 0;
   }
 }
 
-void CatcherController::intercept(const RobotState& state, CatchPlan& plan) noexcept {
+void CatcherController::intercept(const RobotState& state, double dt, CatchPlan& plan) noexcept {
   if (track_.is_known(state.utime)) {
     const auto ball = track_.at(state.utime);
     const double now = static_cast<double>(state.utime) * 1e-6;
-    const InterceptionPlan& found = interception_.update(now, {ball.p(), ball.v(), ball.x(6)}, memory_.motion);
+    // An arm that waits for its run-up is as good as there.
+    planning::JointMotion motion = memory_.motion;
+    motion.q += 0.5 * config_.course.run_up * memory_.give;
+    const InterceptionPlan& found = interception_.update(now, {ball.p(), ball.v(), ball.x(6)}, motion);
     plan.status = status_of(found.status);
     plan.committed = found.committed;
     if (!found.exists()) return;
@@ -258,22 +226,61 @@ void CatcherController::intercept(const RobotState& state, CatchPlan& plan) noex
     plan.p_ABall = found.p_ABall;
     plan.q = found.q;
     plan.slack = found.slack;
+    choose_give(found, found.time - now, dt);
     const RigidTransform cup = kinematics::arm5_forward(arm_, found.q.head<5>());
     plan.p_ACup = cup.p;
     plan.axis_ACup = cup.R.col(2);
   }
 }
 
+/// Whether there is time to give way is looked at until the run-up begins; from then on it stays.
+void CatcherController::choose_give(const InterceptionPlan& found, double left, double dt) noexcept {
+  const double run_up = config_.course.run_up;
+  if (memory_.running_up) return;
+  const bool giving = !memory_.give.isZero();
+  memory_.give = give(found);
+  memory_.running_up = left <= run_up;
+  const bool in_time = memory_.running_up
+                           ? giving && planning::keeps_to_limits(config_.motion, model_.num_joints, found.q,
+                                                                 memory_.give, left + dt, memory_.motion)
+                           : found.slack > (giving ? 0.5 : 1.5) * run_up;
+  const auto meeting = track_.at(static_cast<std::int64_t>(found.time * 1e6));
+  const double variance = meeting.P.topLeftCorner<3, 3>().trace() / 3.0;
+  if (!in_time || variance > config_.course.give_sigma * config_.course.give_sigma) memory_.give.setZero();
+}
+
+/// The joints' speeds with which the cup yields to the ball, of least norm and within a share of their limits.
+JointVector CatcherController::give(const InterceptionPlan& found) const noexcept {
+  constexpr double damping = 0.05;  // m/rad, where the cup cannot move that way
+  constexpr double most = 0.8;      // of a joint's speed, and of what its acceleration gives it in the run-up
+  constexpr double peak = 1.5;      // of the run-up's acceleration over its mean
+  rigid_body::JointJacobian J_b;
+  const RigidTransform T = rigid_body::body_jacobian(tree_, cup_, found.q, J_b);
+  const Eigen::Matrix<double, 3, 5> J = T.R * J_b.bottomRows<3>().leftCols<5>();
+  const double speed = std::min(config_.course.give * found.v_ABall.norm(), config_.course.max_give);
+  const Matrix3 A = J * J.transpose() + damping * damping * Matrix3::Identity();
+  JointVector v = JointVector::Zero();
+  v.head<5>() = J.transpose() * A.llt().solve(speed * found.v_ABall.normalized());
+  const auto attainable =
+      config_.motion.speed.cwiseMin(config_.course.run_up / peak * config_.motion.acceleration).head<5>().array();
+  const double share = (v.head<5>().array() / attainable).abs().maxCoeff();
+  return share > most ? JointVector(v * (most / share)) : v;
+}
+
 /// The posture with its cup turned up, as far as the last pitch joint goes.
 JointVector CatcherController::upright(const JointVector& q) const noexcept {
-  // The axis is up where the pitch q2 + q3 + q4 is pi; from an arm that reaches over its back the same.
-  const auto& joint = model_.joints[3];
+  // The axis is up where the pitch q2 + q3 + q4 is pi.
   JointVector turned = q;
-  const double pitch = q[1] + q[2] + q[3];
-  turned[3] += std::remainder(std::numbers::pi - pitch, 2.0 * std::numbers::pi);
-  turned[3] =
-      std::clamp(turned[3], joint.lower + config_.planner.limit_margin, joint.upper - config_.planner.limit_margin);
-  return turned;
+  turned[3] += std::remainder(std::numbers::pi - (q[1] + q[2] + q[3]), 2.0 * std::numbers::pi);
+  return within_limits(turned);
+}
+
+JointVector CatcherController::within_limits(JointVector q) const noexcept {
+  for (int i = 0; i < model_.num_joints; ++i) {
+    const auto& joint = model_.joints[static_cast<std::size_t>(i)];
+    q[i] = std::clamp(q[i], joint.lower + config_.planner.limit_margin, joint.upper - config_.planner.limit_margin);
+  }
+  return q;
 }
 
 void CatcherController::move(const RobotState& state, double dt, CatchPlan& plan) noexcept {
@@ -285,17 +292,26 @@ void CatcherController::move(const RobotState& state, double dt, CatchPlan& plan
     if (!memory_.moving) memory_.phase_time = 0.0;
     memory_.moving = true;
   }
-  JointVector target = config_.place;
+  JointVector target = config_.place, speed = JointVector::Zero();
   double time_left = config_.course.return_time - memory_.phase_time;
   if (plan.phase == CatchPhase::kCatching && interception_.plan().exists()) {
+    const double run_up = config_.course.run_up;
+    time_left = seconds(state.utime, plan.catch_utime);
     target = plan.q;
-    time_left = seconds(state.utime, plan.catch_utime) - config_.course.arrive_early;
+    if (memory_.running_up || memory_.give.isZero()) {
+      speed = memory_.give;
+    } else {
+      target = within_limits(plan.q - 0.5 * run_up * memory_.give);
+      time_left -= run_up;
+    }
   } else if (plan.phase == CatchPhase::kHolding) {
-    const bool settled = memory_.phase_time >= config_.course.settle;
-    target = settled ? upright(plan.q) : plan.q;
-    time_left = settled ? config_.course.settle + config_.course.upright_time - memory_.phase_time : 0.0;
+    const CatchConfig& course = config_.course;
+    const JointVector rest = within_limits(plan.q + 0.5 * course.settle * memory_.give);
+    const bool settled = memory_.phase_time >= course.settle;
+    target = settled ? upright(rest) : rest;
+    time_left = (settled ? course.settle + course.upright_time : course.settle) - memory_.phase_time;
   }
-  if (dt > 0.0) planning::advance(config_.motion, model_.num_joints, target, time_left + dt, dt, motion);
+  planning::advance(config_.motion, model_.num_joints, target, speed, time_left + dt, dt, motion);
   plan.q_ref = motion.q;
   plan.v_ref = motion.v;
 }

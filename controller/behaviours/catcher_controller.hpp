@@ -3,8 +3,10 @@
 //
 //   uncalibrated   waits for the camera's points; refused ones are told with their reason
 //   waiting        in its place, until a ball is in flight
-//   catching       on its way to where the interception has it, decided anew each tick
-//   holding        the ball should be in the cup, which stays, then turns up
+//   catching       on its way to where the interception has it, decided anew each tick. Where there is time, the cup
+//                  meets the ball giving way, with a share of its velocity: it waits before the meeting's place, by
+//                  give run_up / 2, and takes up that velocity in the last run_up
+//   holding        the ball should be in the cup, which comes to rest, and then turns up
 //   returning      to its place
 // The joints follow a reference that planning/joint_motion.hpp moves. Its command, for the middle of its effect:
 //   feedforward_torque = Newton-Euler of (q, v, a)      position = q      velocity = v
@@ -12,7 +14,8 @@
 #include "controller/behaviours/ball_track.hpp"
 #include "controller/behaviours/catcher_config.hpp"
 #include "controller/math/se3.hpp"
-#include "controller/rigid_body/screw_tree.hpp"
+#include "controller/rigid_body/chain.hpp"
+#include "controller/safety/intake.hpp"
 
 namespace stance::behaviours {
 
@@ -21,6 +24,8 @@ class CatcherController {
   /// Takes all memory. Throws std::invalid_argument where the model is not document 001's arm or the configuration is
   /// out of range.
   CatcherController(const CatcherConfig& config, const rigid_body::Model& model);
+  CatcherController(const CatcherController&) = delete;  // the intake refers to the model
+  CatcherController& operator=(const CatcherController&) = delete;
 
   /// One tick. The same inputs since construction give the same outputs, bit for bit. A state of another run starts
   /// afresh.
@@ -29,42 +34,42 @@ class CatcherController {
  private:
   /// What a run has made of the controller so far: a new run starts with a new one.
   struct Memory {
-    std::int64_t run_id = 0;
-    std::int64_t state_seq = 0;         ///< last state acted on
-    std::int64_t state_utime = -1;      ///< us
-    UserCommand user_command;           ///< last plausible one, or what is left of it when it is old
-    std::int64_t user_command_age = 0;  ///< control periods since it came, by the ticks
-    std::int64_t calibration_seq = 0;   ///< of the last points
-    std::int64_t ball_utime = -1;       ///< us, of the last observation
-    RigidTransform T_AK;                ///< of the camera
-    bool moving = false;                ///< the reference has begun
-    planning::JointMotion motion;       ///< the reference, at state_utime
-    double phase_time = 0.0;            ///< s, since the phase began
-    TickOutput last;                    ///< what HOLD repeats
+    std::int64_t calibration_seq = 0;        ///< of the last points
+    std::int64_t ball_utime = -1;            ///< us, of the last observation
+    RigidTransform T_AK;                     ///< of the camera
+    bool moving = false;                     ///< the reference has begun
+    int periods = 0;                         ///< control periods since the reference was moved
+    JointVector give = JointVector::Zero();  ///< rad/s, with which the joints are to meet the ball
+    bool running_up = false;                 ///< to that speed
+    planning::JointMotion motion;            ///< the reference, at the last state acted on
+    double phase_time = 0.0;                 ///< s, since the phase began
+    TickOutput last;                         ///< what HOLD repeats
   };
 
   void start_run(std::int64_t run_id) noexcept;
-  bool accept(const TickInput& input) noexcept;
-  void take_command(const TickInput& input) noexcept;
-  void calibrate(const CalibrationPoints& points, CatchPlan& plan) noexcept;
+  void calibrate(const TickInput& input, CatchPlan& plan) noexcept;
   void observe(const TickInput& input, BallEstimate& ball, CatchPlan& plan) noexcept;
   void plan(const RobotState& state, double dt, CatchPlan& plan) noexcept;
   void enter(CatchPhase phase, CatchPlan& plan) noexcept;
-  void intercept(const RobotState& state, CatchPlan& plan) noexcept;
+  void intercept(const RobotState& state, double dt, CatchPlan& plan) noexcept;
   void move(const RobotState& state, double dt, CatchPlan& plan) noexcept;
   JointVector upright(const JointVector& q) const noexcept;
+  JointVector within_limits(JointVector q) const noexcept;
+  void choose_give(const planning::InterceptionPlan& found, double left, double dt) noexcept;
+  JointVector give(const planning::InterceptionPlan& found) const noexcept;
   void computed_torque(const planning::JointMotion& reference, JointCommand& command) const noexcept;
-  bool follows(const RobotState& state) const noexcept;
   /// What the arm is commanded in DAMP and STOP.
   void give_up(SafetyMode mode, TickOutput& out) const noexcept;
 
   CatcherConfig config_;
   rigid_body::Model model_;
   rigid_body::ScrewTree tree_;
+  rigid_body::Tip cup_;
   kinematics::Arm5Geometry arm_;
 
   Memory memory_;
   safety::FaultLadder ladder_;
+  safety::Intake intake_;
   BallTrack track_;
   planning::Interception interception_;
 };

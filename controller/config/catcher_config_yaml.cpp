@@ -55,7 +55,10 @@ void planner(StrictYaml yaml, int num_joints, behaviours::CatcherConfig& c) {
 
 behaviours::CatchConfig course(StrictYaml yaml) {
   behaviours::CatchConfig c;
-  c.arrive_early = yaml.number("arrive_early");
+  c.give = yaml.number("give");
+  c.max_give = yaml.number("max_give");
+  c.give_sigma = yaml.number("give_sigma");
+  c.run_up = yaml.number("run_up");
   c.settle = yaml.number("settle");
   c.upright_time = yaml.number("upright_time");
   c.hold_time = yaml.number("hold_time");
@@ -83,7 +86,7 @@ behaviours::CatcherConfig catcher_config(const RobotDescription& robot) {
   }
   StrictYaml yaml = root.mapping("controller");
   behaviours::CatcherConfig c;
-  c.user_command_timeout = yaml.number("user_command_timeout");
+  c.intake.user_command_timeout = yaml.number("user_command_timeout");
   StrictYaml calibration = yaml.mapping("calibration");
   c.max_calibration_rms = calibration.number("max_rms");
   calibration.finish();
@@ -91,7 +94,7 @@ behaviours::CatcherConfig catcher_config(const RobotDescription& robot) {
   planner(yaml.mapping("planner"), robot.model.num_joints, c);
   c.course = course(yaml.mapping("catch"));
   c.computed_torque = computed_torque(yaml.mapping("computed_torque"));
-  read_safety(yaml.mapping("safety"), c.fault_ladder, c.validation);
+  read_safety(yaml.mapping("safety"), c.fault_ladder, c.intake.validation);
   yaml.finish();
   c.damping = robot.drives.damping;
   c.place = robot.nominal_joint_position;
