@@ -47,7 +47,7 @@ from .check import Limit, limits_of
 from .errors import StanceError
 from .programs import share_directory
 
-RANDOM_VALUES = {"uniform", "choice"}  # a mapping with one of these is a value that the simulator draws
+RANDOM_VALUES = {"uniform", "normal", "choice"}  # a mapping with one of these is a value that the simulator draws
 VARIABLE = re.compile(r"\$(?:\{([A-Za-z_][\w.]*)\}|([A-Za-z_]\w*(?:\.[A-Za-z_]\w*)*))")
 OPTIONAL = ("set", "set_robot", "limits", "log_limits", "mean_limits")
 
