@@ -106,7 +106,6 @@ int main(int argc, char** argv) {
       ticker.tick(1, clock);
       clock.finish();
       for (const auto& [channel, message] : ticker.published()) {
-        if (message.size == 0) continue;
         record(channel, message.bytes());
         if (channel == std::string_view(io::channel::kForcePlan)) {
           simulator.accept(io::decoded<stance_msgs::force_plan_t>(message.bytes()));

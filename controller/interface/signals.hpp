@@ -219,13 +219,13 @@ struct Arm3Motion {
 
 /// The ball as the filter has it, in the arm's base frame A.
 struct BallEstimate {
-  bool updated = false;    ///< an observation came in this tick: only then it is published
+  bool updated = false;    ///< an observation came in this tick
   std::int64_t utime = 0;  ///< us, of the observation
   std::int64_t observation_seq = 0;
   Vector3 p_A = Vector3::Zero();                                                 ///< m
   Vector3 v_A = Vector3::Zero();                                                 ///< m/s
   Eigen::Matrix<double, 6, 6> covariance = Eigen::Matrix<double, 6, 6>::Zero();  ///< of (p, v)
-  double nis = 0.0;  ///< of the observation, per degree of freedom; NaN where nothing was compared
+  double nis = 0.0;  ///< of that observation, per degree of freedom; NaN where nothing was compared
 };
 
 enum class CatchPhase : std::int8_t { kUncalibrated = 0, kWaiting = 1, kCatching = 2, kHolding = 3, kReturning = 4 };

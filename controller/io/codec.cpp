@@ -1,6 +1,7 @@
 #include "controller/io/codec.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <stance_msgs/arm3_motion_t.hpp>
 #include <stance_msgs/ball_estimate_t.hpp>
 #include <stance_msgs/ball_observation_t.hpp>
@@ -214,8 +215,6 @@ void encode(const Header& header, const Arm3Motion& motion, Message& out) noexce
 }
 
 void encode(const Header& header, const BallEstimate& ball, Message& out) noexcept {
-  out.size = 0;
-  if (!ball.updated) return;
   ball_estimate_t message{};
   message.utime = ball.utime;
   message.seq = header.seq;
@@ -226,7 +225,7 @@ void encode(const Header& header, const BallEstimate& ball, Message& out) noexce
   for (int i = 0; i < 6; ++i) {
     for (int j = 0; j < 6; ++j) message.covariance[i][j] = ball.covariance(i, j);
   }
-  message.nis = ball.nis;
+  message.nis = ball.updated ? ball.nis : std::numeric_limits<double>::quiet_NaN();
   encode_whole(message, out);
 }
 

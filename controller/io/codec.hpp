@@ -97,7 +97,7 @@ struct Message {
 void encode(const Header& header, const JointCommand& command, Message& out) noexcept;
 void encode(const Header& header, const ForcePlan& plan, Message& out) noexcept;
 void encode(const Header& header, const Arm3Motion& motion, Message& out) noexcept;
-/// Nothing, size 0, where no observation came in the tick.
+/// Its nis is NaN where no observation came in the tick.
 void encode(const Header& header, const BallEstimate& ball, Message& out) noexcept;
 void encode(const Header& header, const CatchPlan& plan, Message& out) noexcept;
 void encode(const Header& header, const Consumed& consumed, const Trace& trace, Message& out) noexcept;

@@ -11,9 +11,7 @@ void run_lockstep(Ticker& ticker, io::Transport& transport, const std::vector<st
   std::int64_t last_utime = 0;
 
   const auto answer = [&] {
-    for (const Published& out : ticker.published()) {
-      if (out.message.size > 0) transport.publish(out.channel, out.message.bytes());
-    }
+    for (const Published& out : ticker.published()) transport.publish(out.channel, out.message.bytes());
   };
   transport.subscribe(io::channel::kUserCommand,
                       [&](io::Bytes bytes) { static_cast<void>(ticker.offer_user_command(bytes)); });

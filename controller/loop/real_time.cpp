@@ -99,9 +99,7 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
     clock.start();
     timing.state_age_us = static_cast<double>(timing.start_utime) - static_cast<double>(ticker.state().utime);
     ticker.tick(periods, clock);
-    for (const Published& out : ticker.published()) {
-      if (out.message.size > 0) transport.publish(out.channel, out.message.bytes());
-    }
+    for (const Published& out : ticker.published()) transport.publish(out.channel, out.message.bytes());
     clock.finish();
 
     if (ticker.state().run_id != run_id) {

@@ -70,7 +70,7 @@ class Ticker {
   const io::Header& header() const noexcept { return header_; }
   const TickOutput& output() const noexcept { return output_; }
   /// All that the last tick published, in the order in which it goes out: the robot's own messages, its command, its
-  /// trace. An empty one does not go out.
+  /// trace.
   std::span<const Published> published() const noexcept { return published_; }
   const io::Message& command() const noexcept { return published_[published_.size() - 2].message; }
   const io::Message& trace() const noexcept { return published_.back().message; }
