@@ -21,6 +21,11 @@ CHANNELS = {
     "JOINT_COMMAND": "joint_command_t",
     "FORCE_PLAN": "force_plan_t",
     "ARM3_MOTION": "arm3_motion_t",
+    "CALIBRATION_POINTS": "calibration_points_t",
+    "BALL_OBSERVATION": "ball_observation_t",
+    "BALL_TRUTH": "ball_truth_t",
+    "BALL_ESTIMATE": "ball_estimate_t",
+    "CATCH_PLAN": "catch_plan_t",
     "CONTROLLER_TRACE": "controller_trace_t",
     "CONTROLLER_TIMING": "controller_timing_t",
     "RUN_INFO_SIMULATOR": "run_info_t",
@@ -31,7 +36,15 @@ CHANNELS = {
 OPERATOR_CHANNELS = ("USER_COMMAND", "STOP", "PUSH")
 """sent by hand: their clock is the operator's, not the simulator's"""
 
-CONTROLLER_CHANNELS = ("JOINT_COMMAND", "FORCE_PLAN", "ARM3_MOTION", "CONTROLLER_TRACE", "CONTROLLER_TIMING")
+CONTROLLER_CHANNELS = (
+    "JOINT_COMMAND",
+    "FORCE_PLAN",
+    "ARM3_MOTION",
+    "BALL_ESTIMATE",
+    "CATCH_PLAN",
+    "CONTROLLER_TRACE",
+    "CONTROLLER_TIMING",
+)
 """what the controller sends once a tick"""
 
 SELF_TEST_CHANNEL = "LCM_SELF_TEST"

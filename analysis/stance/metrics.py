@@ -12,6 +12,8 @@ import numpy as np
 
 from . import configuration, signals
 from .arm3 import Motion, motions
+from .catcher import Catching
+from .catcher import measure as catching
 from .estimation import EstimatorError, estimator_error
 from .messages import CHANNELS
 from .series import Array, Floats, Integers, Run, missing_after, restarted
@@ -234,6 +236,8 @@ class Metrics:
     """between two user commands that want different things"""
     motions: list[Motion]
     """of the 3-joint arm"""
+    catching: Catching | None
+    """of the catcher"""
     pushes: list[Push]
     refused: dict[str, int]
     refused_total: int
@@ -275,6 +279,7 @@ def measure(run: Run, report: LogReport | None = None) -> Metrics:
         walking=walking(run) if on_feet else None,
         segments=segments(run) if on_feet else [],
         motions=motions(run),
+        catching=catching(run),
         pushes=pushes(run),
         refused=refused,
         refused_total=sum(refused.values()),

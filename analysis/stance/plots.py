@@ -12,8 +12,9 @@ from matplotlib.patches import Rectangle
 from matplotlib.ticker import MaxNLocator
 from scipy.stats import chi2
 
-from . import arm3, configuration, estimation, metrics, signals, style, walking
+from . import arm3, catcher, configuration, estimation, metrics, signals, style, walking
 from .arm_plots import joint_rates, tracking, way
+from .catcher_plots import ball, catches
 from .check import Verdict
 from .gait_plots import footholds, gait, maps, swing, velocity
 from .metrics import Metrics
@@ -50,6 +51,9 @@ def summary_card(run: Run, measured: Metrics, verdict: Verdict | None = None) ->
     outcome = f"{'ran' if signals.on_fixed_base(run) else 'stood'} {run.duration:.1f} s"
     if measured.motions:
         outcome = f"{counted(len(measured.motions), 'motion')} in {run.duration:.1f} s"
+    elif measured.catching is not None:
+        caught = sum(one.verdict == "caught" for one in measured.catching.throws)
+        outcome = f"{caught} of {counted(len(measured.catching.throws), 'ball')} caught in {run.duration:.1f} s"
     elif measured.fell_at is not None:
         outcome = f"fell after {measured.fell_at:.2f} s"
     elif measured.walking is not None:
@@ -583,6 +587,8 @@ PLOTS = {
     "arm": Plot("The arm", way, arm3.plays),
     "joint_rates": Plot("Joint rates: calculated over given", joint_rates, arm3.plays),
     "tracking": Plot("Tracking, and the map kept by velocities", tracking, arm3.plays),
+    "catches": Plot("Catches", catches, catcher.catches),
+    "ball": Plot("The ball's filter", ball, catcher.catches),
     "walk": Plot("The walk from the side", walk, walks),
     "timing": Plot("Tick period and stage times", timing, lambda run: "CONTROLLER_TIMING" in run),
     "center_of_mass": Plot("Centre of mass and base", center_of_mass, _on_feet(lambda run: "CONTROLLER_TRACE" in run)),

@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from . import __version__, configuration, plots, signals, style
 from .arm3 import Motion
+from .catcher import Catching, Throw
 from .check import DIRECTORY, SHARE, Verdict, judge, limits_file, load_limits, quantity
 from .errors import StanceError
 from .log import Log
@@ -164,6 +165,14 @@ def tables(metrics: Metrics, estimator: Verdict | None = None) -> list[Table]:
         found.append(Table("Walking by command", head, [_segment(one) for one in metrics.segments]))
     for number, motion in enumerate(metrics.motions, 1):
         found.append(Table(f"Motion {number}: {motion.behaviour}", ["figure", "value"], _arm_motion(motion)))
+    if metrics.catching is not None:
+        found.append(Table("Catching", ["figure", "value"], _catching(metrics.catching)))
+        head = ["throw", "at", "verdict", "crossed the cup's plane", "in the cup for 0.5 s"]
+        rows = [
+            [f"{one.number}", quantity(one.time, "s"), one.verdict, _crossing(one), "yes" if one.retained else "no"]
+            for one in metrics.catching.throws
+        ]
+        found.append(Table("Throws", head, rows))
     if estimator is not None:
         marks = {True: "✓", False: "✗"}
         rows = [
@@ -276,6 +285,24 @@ def _arm_motion(of: Motion) -> list[list[str]]:
         ("orthonormality of the map, largest defect", of.orthonormality_max, ""),
     ]
     return [[name, quantity(value, unit)] for name, value, unit in rows if value is not None]
+
+
+def _catching(of: Catching) -> list[list[str]]:
+    rows: list[tuple[str, float | None, str]] = [
+        ("throws that crossed the cup's plane as asked", of.crossed, "share"),
+        ("throws that stayed in the cup", of.retained, "share"),
+        ("estimated ball from the true one, rms", of.ball_error_rms, "m"),
+        ("NIS of its observations per degree of freedom, mean", of.nis, ""),
+        ("joint from its reference, largest", of.joint_error_max, "rad"),
+        ("cup from its reference, largest", of.cup_error_max, "m"),
+    ]
+    return [[name, quantity(value, unit)] for name, value, unit in rows if value is not None]
+
+
+def _crossing(one: Throw) -> str:
+    if one.crossing_offset is None or one.crossing_angle_deg is None:
+        return "no"
+    return f"{quantity(one.crossing_offset, 'm')} from the axis, at {quantity(one.crossing_angle_deg, 'deg')}"
 
 
 def _segment(one: Segment) -> list[str]:

@@ -12,6 +12,7 @@ from stance.metrics import measure
 from stance.series import Run
 from synthetic import Synthetic, Walk, run_of
 from synthetic_arm import SyntheticArm
+from synthetic_catcher import SyntheticCatcher
 
 FIGURES = {
     "fell": False,
@@ -99,7 +100,8 @@ def test_what_is_no_list_of_limits_is_an_error(text: str) -> None:
 @pytest.mark.parametrize("path", sorted(DIRECTORY.glob("*.yaml")), ids=lambda path: path.stem)
 def test_every_list_that_comes_with_the_package_names_figures_that_exist(path: Path) -> None:
     of_biped = Synthetic(duration=5.0, walk=Walk(start=1.0, speed=0.4))
-    log = Log.from_bytes((SyntheticArm() if path.stem.startswith("arm3") else of_biped).log())
+    arms: dict[str, Synthetic] = {"arm3": SyntheticArm(), "catcher": SyntheticCatcher()}
+    log = Log.from_bytes(arms.get(path.stem.partition("_")[0], of_biped).log())
     findings = judge(measure(log.run(), log.report).as_dict(), load_limits(path)).findings
     # A list may name stretches of its own scenario's script.
     figures = [finding for finding in findings if not finding.limit.metric.startswith("segments.")]
