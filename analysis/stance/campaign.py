@@ -128,6 +128,8 @@ class Tally:
     """None where the cell that it is compared with did not run"""
     figures: list[Figure]
     failures: list[Failure]
+    verdicts: dict[str, int] = field(default_factory=dict)
+    """what became of the balls thrown at a catcher: verdict → throws, of every trial"""
     pushes: list[PushTrial] = field(default_factory=list)
     """every trial, where the scenario has exactly one push"""
 
@@ -217,6 +219,8 @@ def as_text(outcome: Outcome, shown: int = 3) -> str:
             past = f"{counted(one.failed, 'trial')} not {one.rule}" if one.failed else f"all {one.rule}"
             if one.told or one.failed:
                 lines.append(f"       {one.name} {one.told}{past}")
+        if cell.verdicts:
+            lines.append(f"       {told_verdicts(cell.verdicts)}")
         for failure in cell.failures[:shown]:
             drawn = [f"{path} = {value}" for path, value in failure.drawn.items()]
             lines.append(f"       seed {failure.seed}: {'; '.join([*failure.why, *drawn])}; again: {failure.command}")
@@ -229,6 +233,11 @@ def as_text(outcome: Outcome, shown: int = 3) -> str:
         f"{counted(outcome.qp_iterations_max, 'QP iteration')}"
     )
     return "\n".join(lines)
+
+
+def told_verdicts(verdicts: dict[str, int]) -> str:
+    """For people: the verdicts that there were, most first."""
+    return ", ".join(f"{name} {count}" for name, count in sorted(verdicts.items(), key=lambda one: -one[1]) if count)
 
 
 # ---- the program -----------------------------------------------------------------------------------------------------
@@ -381,6 +390,13 @@ def _unused(study: Study, program: _Program, store: _Store) -> Iterator[str]:
 # ---- the campaign ----------------------------------------------------------------------------------------------------
 
 
+def _verdicts(trials: Sequence[_Trial]) -> dict[str, int]:
+    counts: Counter[str] = Counter()
+    for trial in trials:
+        counts.update(trial.rollout.get("catch", {}).get("verdicts", {}))
+    return dict(counts)
+
+
 def _named(cell: Cell, patterns: Sequence[str]) -> bool:
     return any(fnmatchcase(cell.name, pattern) for pattern in patterns)
 
@@ -470,6 +486,7 @@ class _Campaign:
             met=False if any(mean.failed for mean in means) else _met(cell, rates),
             figures=[*_figures(cell, stood), *means],
             failures=failures,
+            verdicts=_verdicts(trials),
             pushes=_pushes(cell, trials, {failure.seed for failure in failures}),
         )
 

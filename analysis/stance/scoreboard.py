@@ -8,7 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from .campaign import Outcome
+from .campaign import Outcome, told_verdicts
 from .check import quantity
 from .errors import StanceError
 from .plain import counted
@@ -82,6 +82,7 @@ def _small(outcome: Outcome) -> dict[str, Any]:
                 "interval": [rounded(bound) for bound in cell.interval],
                 "asked": cell.asked,
                 "met": cell.met,
+                "verdicts": cell.verdicts,
                 "figures": [
                     {
                         "name": one.name,
@@ -114,7 +115,7 @@ def table(document: dict[str, Any]) -> str:
                     f"{cell['succeeded']}/{cell['trials']}",
                     f"{low:.2f} to {high:.2f}",
                     asked,
-                    "; ".join(filter(None, map(_figure, cell["figures"]))),
+                    "; ".join(filter(None, [*map(_figure, cell["figures"]), told_verdicts(cell.get("verdicts", {}))])),
                     f"`{words}`",
                 )
             )
