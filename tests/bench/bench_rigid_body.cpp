@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "controller/config/catcher_config_yaml.hpp"
 #include "controller/kinematics/arm3.hpp"
 #include "controller/kinematics/arm5.hpp"
 #include "controller/rigid_body/chain.hpp"
@@ -124,6 +125,30 @@ bool chain(const char* name, const Model& model) {
   return true;
 }
 
+/// The catcher's planning of one tick.
+void interception() {
+  const auto robot = config::robot_from_texts(read("robots/catcher/catcher.yaml"), read("robots/catcher/catcher.urdf"));
+  const behaviours::CatcherConfig config = config::catcher_config(robot);
+  const kinematics::Arm5Geometry arm = kinematics::arm5_geometry(robot.model, config.tool);
+  planning::Interception planner(config.planner, arm, kinematics::arm5_limits(robot.model), config.motion);
+  planning::JointMotion motion;
+  motion.q = config.place;
+  std::mt19937 random(6);
+  std::uniform_real_distribution<double> aside(-0.2, 0.2), distance(2.5, 4.5), time(0.3, 0.9);
+  std::vector<planning::BallState> balls;
+  for (int i = 0; i < kStates; ++i) {
+    const Vector3 from(distance(random), aside(random), 1.2);
+    const Vector3 aim(0.55 + aside(random), aside(random), 0.8 + aside(random));
+    const double flight = time(random);
+    balls.push_back({from, (aim - from) / flight + 0.5 * flight * Vector3(0.0, 0.0, kGravity), 0.0});
+  }
+  std::printf("catcher\n");
+  measure("  interception of a ball, planned", [&](int i) {
+    planner.reset();
+    return planner.update(0.0, balls[i], motion).time;
+  });
+}
+
 }  // namespace
 
 int main() {
@@ -149,6 +174,7 @@ int main() {
           [&](int i) { return kinematics::arm5_ik(geometry, vertical[i]).t[0](0); });
   measure("  by position, pitch and roll, up to 4",
           [&](int i) { return kinematics::arm5_ik(geometry, pose[i].p, q[i](0), 0.0).t[0](0); });
+  interception();
   std::printf("3-joint arm in closed form\n");
   const kinematics::Arm3Geometry arm3;
   measure("  Jacobian and least-squares joint rates", [&](int i) {
