@@ -53,6 +53,15 @@ def arm_in_real_time(out: Path) -> dict[str, Any]:
     return {"fell": record(request(out, True, REAL_TIME_DURATION, robot="arm3")).fell}
 
 
+def catcher(out: Path) -> dict[str, Any]:
+    """Balls are thrown at the catcher."""
+    return {"fell": record(request(out, False, LOCKSTEP_DURATION, robot="catcher")).fell}
+
+
+def catcher_in_real_time(out: Path) -> dict[str, Any]:
+    return {"fell": record(request(out, True, REAL_TIME_DURATION, robot="catcher")).fell}
+
+
 def lockstep_with_false_truth(out: Path) -> dict[str, Any]:
     """Somebody else says TRUTH all the time, and nothing that it says is true."""
     done = threading.Event()
@@ -231,6 +240,8 @@ if __name__ == "__main__":
         "single_body": single_body,
         "walk": walk,
         "arm": arm,
+        "catcher": catcher,
+        "catcher_in_real_time": catcher_in_real_time,
         "arm_in_real_time": arm_in_real_time,
         "lockstep_with_false_truth": lockstep_with_false_truth,
         "real_time": real_time,
