@@ -149,8 +149,8 @@ class Outcome:
     cells: list[Tally]
     tick_cpu: TickCpu
     """of every trial"""
-    qp_iterations_max: int
-    """of any tick"""
+    qp_iterations_max: int | None
+    """of any tick; None of a robot that solves no QP"""
 
     @property
     def met(self) -> bool:
@@ -199,7 +199,9 @@ def run_campaign(
             directory=str(program.directory),
             cells=campaign.tallies(),
             tick_cpu=merge(told["tick_cpu"] for told in campaign.rollouts()),
-            qp_iterations_max=max(told["qp_iterations_max"] for told in campaign.rollouts()),
+            qp_iterations_max=max(
+                (told["qp_iterations_max"] for told in campaign.rollouts() if "qp_iterations_max" in told), default=None
+            ),
         )
     (program.directory / "summary.json").write_text(to_json(outcome.as_dict()) + "\n")
     return outcome
@@ -228,10 +230,9 @@ def as_text(outcome: Outcome, shown: int = 3) -> str:
             lines.append(f"       and {len(cell.failures) - shown} more, all in {outcome.directory}/summary.json")
     cpu = outcome.tick_cpu
     times = " / ".join(f"{time:,.0f}" for time in (cpu.p50_us, cpu.p99_us, cpu.p99_9_us, cpu.max_us))
-    lines.append(
-        f"     {cpu.ticks:,} ticks: CPU p50 / p99 / p99.9 / max {times} µs; at most "
-        f"{counted(outcome.qp_iterations_max, 'QP iteration')}"
-    )
+    lines.append(f"     {cpu.ticks:,} ticks: CPU p50 / p99 / p99.9 / max {times} µs")
+    if outcome.qp_iterations_max is not None:
+        lines[-1] += f"; at most {counted(outcome.qp_iterations_max, 'QP iteration')}"
     return "\n".join(lines)
 
 

@@ -127,7 +127,8 @@ def _ticks(study: dict[str, Any]) -> str:
     if "tick_cpu" not in study:
         return "-"
     times = " / ".join(f"{study['tick_cpu'][key]:,.0f}" for key in ("p50_us", "p99_us", "p99_9_us", "max_us"))
-    return f"ticks: {times} µs, at most {counted(study['qp_iterations_max'], 'QP iteration')}"
+    most = study["qp_iterations_max"]
+    return f"ticks: {times} µs" + ("" if most is None else f", at most {counted(most, 'QP iteration')}")
 
 
 def _figure(one: dict[str, Any]) -> str:
