@@ -52,11 +52,12 @@ void advance(const JointMotionLimits& limits, int joints, const JointVector& tar
     const double max_speed = limits.speed[i], max_acceleration = limits.acceleration[i];
     const double T = std::max(time_left, dt);
     const Quintic way(q, v, a, target[i], speed[i], T);
-    if (way.keeps_to(max_speed, max_acceleration, T)) {
-      // Past its end a quintic goes anywhere.
-      const bool ends = dt >= T;
+    const bool ends = dt >= T;  // past its end a quintic goes anywhere
+    const double next = ends ? speed[i] : way.speed(dt);
+    const bool step_keeps = std::abs(next) <= max_speed && std::abs(next - v) <= max_acceleration * dt;
+    if (step_keeps && way.keeps_to(max_speed, max_acceleration, T)) {
       q = ends ? target[i] : way.position(dt);
-      v = ends ? speed[i] : way.speed(dt);
+      v = next;
       a = ends ? 0.0 : way.acceleration(dt);
       continue;
     }

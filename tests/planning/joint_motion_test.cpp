@@ -46,8 +46,8 @@ TEST_CASE("NoJointPassesItsSpeedOrItsAccelerationWhateverIsAskedAndWheneverItCha
         const JointMotion before = motion;
         advance(allowed, kJoints, target, speed, left, kStep, motion);
         for (int i = 0; i < kJoints; ++i) {
-          CHECK(std::abs(motion.v[i]) <= 1.001 * allowed.speed[i]);
-          CHECK(std::abs(motion.v[i] - before.v[i]) / kStep <= 1.05 * allowed.acceleration[i]);
+          CHECK(std::abs(motion.v[i]) <= (1.0 + 1e-9) * allowed.speed[i]);
+          CHECK(std::abs(motion.v[i] - before.v[i]) / kStep <= (1.0 + 1e-9) * allowed.acceleration[i]);
         }
       }
     }
