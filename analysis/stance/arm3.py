@@ -47,8 +47,9 @@ class Motion:
 
 
 def plays(run: Run) -> bool:
-    """Whether the log holds motions of the arm, and its body."""
-    return CHANNEL in run and configuration.robot(run) is not None
+    """Whether the log holds motions of the arm, and the body whose end effector moved."""
+    body = configuration.robot(run)
+    return CHANNEL in run and body is not None and configuration.value(run, "controller.tool") in body.links
 
 
 def spans(run: Run) -> list[Integers]:

@@ -51,7 +51,7 @@ def test_the_names_of_values_are_those_of_the_messages() -> None:
         signals.SINGLE_SUPPORT,
     ]
     behaviours = message_type("user_command_t").python_class
-    assert [getattr(behaviours, name.upper()) for name in signals.BEHAVIOURS] == list(range(5))
+    assert [getattr(behaviours, name.upper()) for name in signals.BEHAVIOURS] == list(range(6))
 
 
 def test_percentiles_are_values_that_occurred() -> None:

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import synthetic_arm
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -25,6 +26,7 @@ from stance.report import MAX_EVENTS, analyse, figures, render, write, write_plo
 from stance.series import Run
 from stance.timeline import timeline
 from synthetic import PERIOD, WALL, Synthetic, Walk, encode_log, records, run_of, ticked
+from synthetic_arm import SyntheticArm
 
 
 def lonely() -> Run:
@@ -40,6 +42,7 @@ def without_truth() -> Run:
 
 WALKING = {"walk", "footholds", "swing"}
 """plots that need steps"""
+OF_THE_BIPED = set(plots.PLOTS) - synthetic_arm.PLOTS
 
 RENDERED = (
     "stand",
@@ -49,14 +52,31 @@ RENDERED = (
 )  # the others are drawn up to their layout: it is what takes the time
 
 
+DIVERGING = {"TRUTH", "FORCE_PLAN", "ARM3_MOTION", "CONTROLLER_TRACE"}
+
+
 def diverged(after: int, walk: Walk | None = None) -> Run:
     """Nothing that is finite from one row on."""
     messages = Synthetic(duration=0.6, pushes=[(0.2, 0.1, (5.0, 0.0, 0.0))], walk=walk).messages()
-    for channel in ("TRUTH", "FORCE_PLAN", "CONTROLLER_TRACE"):
+    for channel in DIVERGING & {*messages}:
         for name in messages[channel].dtype.names or ():
             if messages[channel].dtype[name].base.kind == "f":
                 messages[channel][name][after:] = np.nan
     return run_of(messages)
+
+
+def arm(after: int | None = None) -> Run:
+    """A motion of the 3-joint arm; nothing that is finite from row `after` on."""
+    made = SyntheticArm(motions=((400, (0.2, 0.1, -0.3)),))
+    events = []
+    for channel, rows in made.messages().items():
+        for name in rows.dtype.names or ():
+            if after is not None and channel in DIVERGING and rows.dtype[name].base.kind == "f":
+                rows[name][after:] = np.nan
+        events += [(WALL + i * round(PERIOD * 1e6), channel, row.tobytes()) for i, row in enumerate(rows)]
+    infos = (("RUN_INFO_SIMULATOR", "stance-sim"), ("RUN_INFO_CONTROLLER", "stance-controller"))
+    events += [(WALL, channel, made.run_info(program, 0, 1)) for channel, program in infos]
+    return Log.from_bytes(encode_log(sorted(events))).run()
 
 
 KINDS = {
@@ -75,6 +95,10 @@ KINDS = {
         Synthetic(duration=3.0, pushes=[(1.9, 0.1, (5.0, 0.0, 0.0))], walk=Walk(start=0.5, speed=0.4)).log()
     ).run(),
     "one step": lambda: run_of(Synthetic(duration=0.75, pushes=[], walk=Walk(start=0.2, speed=0.0)).messages()),
+    "arm": lambda: arm(),
+    "arm never finite": lambda: arm(0),
+    "arm diverged": lambda: arm(300),
+    "arm, a part": lambda: arm().between(1.0, 1.5),
     "a part": lambda: Log.from_bytes(Synthetic(duration=3.0).log()).run().between(1.4, 1.9),
 }
 
@@ -113,12 +137,12 @@ def test_the_card_says_what_came_out(made: Synthetic, words: str) -> None:
 
 
 def test_a_plot_is_offered_where_the_log_can_give_it(stand: Run) -> None:
-    assert set(plots.PLOTS) - set(plots.available(stand)) == WALKING
-    assert set(plots.PLOTS) - set(plots.available(without_truth())) == {"picture", "estimator", *WALKING}
+    assert OF_THE_BIPED - set(plots.available(stand)) == WALKING
+    assert OF_THE_BIPED - set(plots.available(without_truth())) == {"picture", "estimator", *WALKING}
     rollout = run_of(
         {name: rows for name, rows in Synthetic(duration=0.5).messages().items() if name != "CONTROLLER_TIMING"}
     )
-    assert set(plots.PLOTS) - set(plots.available(rollout)) == {"timing", *WALKING}
+    assert OF_THE_BIPED - set(plots.available(rollout)) == {"timing", *WALKING}
     assert set(plots.available(lonely())) == {"gait", "joints"}
 
 
@@ -259,7 +283,7 @@ def test_the_report_is_one_file_without_anything_from_outside(written: Path) -> 
     sources = re.findall(r'(?:src|href)="([^"]*)"', html)
     assert all(source.startswith(("data:image/png;base64,", "#")) for source in sources)
     assert "http" not in re.sub(r"base64,[A-Za-z0-9+/=]+", "", html).replace("http-equiv", "")
-    assert html.count("<figure>") == len(set(plots.PLOTS) - WALKING)
+    assert html.count("<figure>") == len(OF_THE_BIPED - WALKING)
     assert "FAIL" in html and "fell after" in html and "woke 25.0 ms late" in html
 
 
@@ -336,7 +360,7 @@ def test_the_summary_is_versioned_and_holds_figures_verdict_and_events(written: 
 def test_a_run_ends_with_the_tick_of_its_last_state_and_the_truth_after_it() -> None:
     messages = Synthetic(duration=0.5).messages()
     events = [(int(row["seq"]), channel, row.tobytes()) for channel, rows in messages.items() for row in rows]
-    for channel in (*CONTROLLER_CHANNELS, "TRUTH"):
+    for channel in {*CONTROLLER_CHANNELS} & {*messages} | {"TRUTH"}:
         last = messages[channel][-1:]
         last["seq"] += 1
         last["utime"] += round(PERIOD * 1e6)
@@ -355,7 +379,7 @@ def test_a_run_ends_with_the_tick_of_its_last_state_and_the_truth_after_it() -> 
 def test_every_plot_lies_beside_the_report(written: Path) -> None:
     assert {path.stem for path in (written / "plots").iterdir()} == {
         "summary_card",
-        *(set(plots.PLOTS) - WALKING),
+        *(OF_THE_BIPED - WALKING),
     }
 
 
