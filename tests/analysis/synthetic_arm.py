@@ -13,8 +13,8 @@ from synthetic import GRAVITY, PERIOD, Synthetic, ticked
 
 ROBOT = Path(__file__).parents[2] / "robots/arm3"
 LENGTHS = (1.0, 0.5, 0.5)  # m, the document's
-PLOTS = {"arm", "joint_rates", "tracking"}
-"""those that only its logs can give"""
+PLOTS = {"arm", "joint_rates", "tracking", "catches", "ball"}
+"""those that only an arm's logs can give, this one's or the catcher's"""
 REST = 50  # ticks before, between and after motions
 
 Floats = npt.NDArray[np.float64]
