@@ -14,6 +14,7 @@ from .errors import StanceError
 from .plain import counted
 
 SCHEMA = {"schema": "stance.studies", "version": 1}
+DEFAULT_ROBOT = "biped"  # of `stance campaign`
 DIGITS = 4  # of what is kept: more would only make noise between two runs
 BEGIN, END = "<!-- studies -->", "<!-- /studies -->"
 HEAD = ("", "succeeded", "95% interval", "asked", "median, worst (asked)", "`stance campaign` with")
@@ -108,7 +109,8 @@ def table(document: dict[str, Any]) -> str:
         for cell in study["cells"]:
             low, high = cell["interval"]
             asked = f"{cell['asked']}, {'met' if cell['met'] else 'not met'}" if cell["asked"] else "stated"
-            words = f"--study {study['study']} --trials {cell['trials']} --seed {study['seed']}"
+            robot = "" if study["robot"] == DEFAULT_ROBOT else f"--robot {study['robot']} "
+            words = f"{robot}--study {study['study']} --trials {cell['trials']} --seed {study['seed']}"
             rows.append(
                 (
                     cell["name"],

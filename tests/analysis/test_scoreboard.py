@@ -16,7 +16,7 @@ from stance.study import load_study
 from stance.tick_cpu import TickCpu
 
 KEPT = SOURCE_TREE / "docs/studies.json"
-STUDIES = sorted(path.stem for path in (SOURCE_TREE / "sim/scenarios/biped/studies").glob("*.yaml"))
+STUDIES = sorted((path.parents[1].name, path.stem) for path in (SOURCE_TREE / "sim/scenarios").glob("*/studies/*.yaml"))
 OUTCOME = Outcome(
     study="pushes",
     title="Pushed while standing",
@@ -125,14 +125,14 @@ def test_the_readmes_table_is_that_of_the_kept_studies() -> None:
     assert readme.read_text() == f"{before}<!-- studies -->\n{table(load(KEPT))}\n<!-- /studies -->{after}"
 
 
-@pytest.mark.parametrize("study", STUDIES)
-def test_every_study_is_kept_as_it_is_now(study: str) -> None:
+@pytest.mark.parametrize(("robot", "study"), STUDIES)
+def test_every_study_is_kept_as_it_is_now(robot: str, study: str) -> None:
     (kept,) = [one for one in load(KEPT)["studies"] if one["study"] == study]
-    now = load_study(study, "biped")
+    now = load_study(study, robot)
     assert kept["title"] == now.title
     assert [cell["name"] for cell in kept["cells"]] == [cell.name for cell in now.cells]
     assert kept["seed"] >= 10_000, "seeds below 10000 are for tuning"
 
 
 def test_nothing_is_kept_of_a_study_that_is_gone() -> None:
-    assert sorted(study["study"] for study in load(KEPT)["studies"]) == STUDIES
+    assert sorted((study["robot"], study["study"]) for study in load(KEPT)["studies"]) == STUDIES
