@@ -146,4 +146,26 @@ void Condensed::forces(const Problem& problem, const double* u, std::vector<forc
   }
 }
 
+Eigen::MatrixXd friction_rows(const Condensed& condensed, double friction, int rows_per_contact) {
+  Eigen::MatrixXd rows = Eigen::MatrixXd::Zero(rows_per_contact * condensed.num_contacts(), condensed.num_variables());
+  for (int c = 0; c < condensed.num_contacts(); ++c) {
+    rows.block<4, 3>(rows_per_contact * c, 3 * c) = friction_faces(friction);
+  }
+  return rows;
+}
+
+Boxed::Boxed(const Condensed& condensed, double friction, double none)
+    : C(friction_rows(condensed, friction, 4)),
+      C_lower(Eigen::VectorXd::Constant(C.rows(), -none)),
+      C_upper(Eigen::VectorXd::Zero(C.rows())),
+      lower(Eigen::VectorXd::Constant(C.cols(), -none)),
+      upper(Eigen::VectorXd::Constant(C.cols(), none)) {
+  take_bounds(condensed);
+}
+
+void Boxed::take_bounds(const Condensed& condensed) {
+  lower(Eigen::seqN(2, condensed.num_contacts(), 3)) = condensed.lower;
+  upper(Eigen::seqN(2, condensed.num_contacts(), 3)) = condensed.upper;
+}
+
 }  // namespace stance::bench

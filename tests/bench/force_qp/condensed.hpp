@@ -50,4 +50,19 @@ inline Eigen::Matrix<double, 4, 3> friction_faces(double friction) {
   return rows;
 }
 
+/// C, with `rows_per_contact` rows for each contact: the friction faces first, then zeros for whoever adds bounds.
+Eigen::MatrixXd friction_rows(const Condensed& condensed, double friction, int rows_per_contact);
+
+/// The inequalities as solvers with bounds on variables take them:   C u <= 0,  lower <= u <= upper
+struct Boxed {
+  /// `none` stands for infinity.
+  Boxed(const Condensed& condensed, double friction, double none);
+  /// To be called where the condensed problem's matrices have changed.
+  void take_bounds(const Condensed& condensed);
+
+  Eigen::MatrixXd C;
+  Eigen::VectorXd C_lower, C_upper;
+  Eigen::VectorXd lower, upper;
+};
+
 }  // namespace stance::bench

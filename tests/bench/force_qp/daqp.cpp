@@ -20,13 +20,10 @@ class Daqp final : public Engine {
  public:
   Daqp(const Sequence& sequence, int num_stages)
       : condensed_(sequence, num_stages), m_(5 * condensed_.num_contacts()), n_(condensed_.num_variables()) {
-    rows_.setZero(m_, n_);
+    rows_ = friction_rows(condensed_, sequence.ticks.front().friction, 5);
     upper_.setZero(m_);
     lower_.setConstant(m_, -kNone);
-    for (int c = 0; c < condensed_.num_contacts(); ++c) {
-      rows_.block<4, 3>(5 * c, 3 * c) = friction_faces(sequence.ticks.front().friction);
-      rows_(5 * c + 4, 3 * c + 2) = 1.0;
-    }
+    for (int c = 0; c < condensed_.num_contacts(); ++c) rows_(5 * c + 4, 3 * c + 2) = 1.0;
     take_bounds();
     sense_.assign(static_cast<std::size_t>(m_), 0);
     x_.assign(static_cast<std::size_t>(n_), 0.0);
@@ -74,10 +71,8 @@ class Daqp final : public Engine {
 
  private:
   void take_bounds() {
-    for (int c = 0; c < condensed_.num_contacts(); ++c) {
-      lower_(5 * c + 4) = condensed_.lower(c);
-      upper_(5 * c + 4) = condensed_.upper(c);
-    }
+    lower_(Eigen::seqN(4, condensed_.num_contacts(), 5)) = condensed_.lower;
+    upper_(Eigen::seqN(4, condensed_.num_contacts(), 5)) = condensed_.upper;
   }
 
   Condensed condensed_;

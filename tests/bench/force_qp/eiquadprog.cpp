@@ -11,12 +11,11 @@ class Eiquadprog final : public Engine {
  public:
   Eiquadprog(const Sequence& sequence, int num_stages)
       : condensed_(sequence, num_stages), m_(6 * condensed_.num_contacts()), n_(condensed_.num_variables()) {
-    rows_.setZero(m_, n_);
+    rows_ = -friction_rows(condensed_, sequence.ticks.front().friction, 6);
     offset_.setZero(m_);
     equalities_.resize(0, n_);
     x_.setZero(n_);
     for (int c = 0; c < condensed_.num_contacts(); ++c) {
-      rows_.block<4, 3>(6 * c, 3 * c) = -friction_faces(sequence.ticks.front().friction);
       rows_(6 * c + 4, 3 * c + 2) = 1.0;
       rows_(6 * c + 5, 3 * c + 2) = -1.0;
     }
@@ -37,10 +36,8 @@ class Eiquadprog final : public Engine {
 
  private:
   void take_bounds() {
-    for (int c = 0; c < condensed_.num_contacts(); ++c) {
-      offset_(6 * c + 4) = -condensed_.lower(c);
-      offset_(6 * c + 5) = condensed_.upper(c);
-    }
+    offset_(Eigen::seqN(4, condensed_.num_contacts(), 6)) = -condensed_.lower;
+    offset_(Eigen::seqN(5, condensed_.num_contacts(), 6)) = condensed_.upper;
   }
 
   Condensed condensed_;

@@ -2,6 +2,7 @@
 #include <array>
 #include <vector>
 
+#include "tests/bench/force_qp/condensed.hpp"
 #include "tests/bench/force_qp/peers.hpp"
 
 extern "C" {
@@ -90,8 +91,7 @@ class Hpipm final : public Engine {
     Eigen::MatrixXd R = Eigen::MatrixXd::Zero(m, m), B(kStates, m), D = Eigen::MatrixXd::Zero(4 * contacts_, m);
     std::array<int, kMaxContacts> bounded{};
     for (int c = 0; c < contacts_; ++c) {
-      D.block<4, 3>(4 * c, 3 * c) << 1.0, 0.0, -problem.friction, -1.0, 0.0, -problem.friction, 0.0, 1.0,
-          -problem.friction, 0.0, -1.0, -problem.friction;
+      D.block<4, 3>(4 * c, 3 * c) = friction_faces(problem.friction);
       bounded[static_cast<std::size_t>(c)] = 3 * c + 2;
     }
     Eigen::VectorXd lower = Eigen::VectorXd::Constant(4 * contacts_, -kNone),

@@ -13,15 +13,8 @@ constexpr double kAccuracy = 1e-9;
 class Piqp final : public Engine {
  public:
   Piqp(const Sequence& sequence, int num_stages)
-      : condensed_(sequence, num_stages), m_(4 * condensed_.num_contacts()), n_(condensed_.num_variables()) {
-    constexpr double kInfinity = std::numeric_limits<double>::infinity();
-    rows_.setZero(m_, n_);
-    row_upper_.setZero(m_);
-    lower_.setConstant(n_, -kInfinity);
-    upper_.setConstant(n_, kInfinity);
-    for (int c = 0; c < condensed_.num_contacts(); ++c) {
-      rows_.block<4, 3>(4 * c, 3 * c) = friction_faces(sequence.ticks.front().friction);
-    }
+      : condensed_(sequence, num_stages),
+        boxed_(condensed_, sequence.ticks.front().friction, std::numeric_limits<double>::infinity()) {
     auto& settings = solver_.settings();
     settings.eps_abs = kAccuracy;
     settings.eps_rel = 0.0;
@@ -31,18 +24,15 @@ class Piqp final : public Engine {
   }
   bool solve(const Problem& problem, bool matrices_changed) override {
     condensed_.update(problem, matrices_changed);
-    if (matrices_changed) {
-      for (int c = 0; c < condensed_.num_contacts(); ++c) {
-        lower_(3 * c + 2) = condensed_.lower(c);
-        upper_(3 * c + 2) = condensed_.upper(c);
-      }
-    }
+    if (matrices_changed) boxed_.take_bounds(condensed_);
     using ::piqp::nullopt;
     if (!is_set_up_) {
       is_set_up_ = true;
-      solver_.setup(condensed_.H, condensed_.q, nullopt, nullopt, rows_, nullopt, row_upper_, lower_, upper_);
+      solver_.setup(condensed_.H, condensed_.q, nullopt, nullopt, boxed_.C, nullopt, boxed_.C_upper, boxed_.lower,
+                    boxed_.upper);
     } else if (matrices_changed) {
-      solver_.update(condensed_.H, condensed_.q, nullopt, nullopt, nullopt, nullopt, nullopt, lower_, upper_);
+      solver_.update(condensed_.H, condensed_.q, nullopt, nullopt, nullopt, nullopt, nullopt, boxed_.lower,
+                     boxed_.upper);
     } else {
       solver_.update(nullopt, condensed_.q);
     }
@@ -55,9 +45,7 @@ class Piqp final : public Engine {
 
  private:
   Condensed condensed_;
-  int m_, n_;
-  Eigen::MatrixXd rows_;
-  Eigen::VectorXd row_upper_, lower_, upper_;
+  Boxed boxed_;
   ::piqp::DenseSolver<double> solver_;
   bool is_set_up_ = false;
 };

@@ -16,34 +16,23 @@ class ProxQp final : public Engine {
  public:
   ProxQp(const Sequence& sequence, int num_stages)
       : condensed_(sequence, num_stages),
-        m_(4 * condensed_.num_contacts()),
-        n_(condensed_.num_variables()),
-        solver_(n_, 0, m_, true, proxqp::HessianType::Dense, proxqp::DenseBackend::Automatic) {
-    rows_.setZero(m_, n_);
-    row_lower_.setConstant(m_, -kNone);
-    row_upper_.setZero(m_);
-    lower_.setConstant(n_, -kNone);
-    upper_.setConstant(n_, kNone);
-    for (int c = 0; c < condensed_.num_contacts(); ++c) {
-      rows_.block<4, 3>(4 * c, 3 * c) = friction_faces(sequence.ticks.front().friction);
-    }
+        boxed_(condensed_, sequence.ticks.front().friction, kNone),
+        solver_(condensed_.num_variables(), 0, boxed_.C.rows(), true, proxqp::HessianType::Dense,
+                proxqp::DenseBackend::Automatic) {
     solver_.settings.eps_abs = kAccuracy;
     solver_.settings.eps_rel = 0.0;
     solver_.settings.initial_guess = proxqp::InitialGuessStatus::WARM_START_WITH_PREVIOUS_RESULT;
   }
   bool solve(const Problem& problem, bool matrices_changed) override {
     condensed_.update(problem, matrices_changed);
-    if (matrices_changed) {
-      for (int c = 0; c < condensed_.num_contacts(); ++c) {
-        lower_(3 * c + 2) = condensed_.lower(c);
-        upper_(3 * c + 2) = condensed_.upper(c);
-      }
-    }
+    if (matrices_changed) boxed_.take_bounds(condensed_);
     if (!is_set_up_) {
       is_set_up_ = true;
-      solver_.init(condensed_.H, condensed_.q, nullopt, nullopt, rows_, row_lower_, row_upper_, lower_, upper_);
+      solver_.init(condensed_.H, condensed_.q, nullopt, nullopt, boxed_.C, boxed_.C_lower, boxed_.C_upper, boxed_.lower,
+                   boxed_.upper);
     } else if (matrices_changed) {
-      solver_.update(condensed_.H, condensed_.q, nullopt, nullopt, nullopt, nullopt, nullopt, lower_, upper_, false);
+      solver_.update(condensed_.H, condensed_.q, nullopt, nullopt, nullopt, nullopt, nullopt, boxed_.lower,
+                     boxed_.upper, false);
     } else {
       solver_.update(nullopt, condensed_.q, nullopt, nullopt, nullopt, nullopt, nullopt, nullopt, nullopt, false);
     }
@@ -57,9 +46,7 @@ class ProxQp final : public Engine {
 
  private:
   Condensed condensed_;
-  int m_, n_;
-  Eigen::MatrixXd rows_;
-  Eigen::VectorXd row_lower_, row_upper_, lower_, upper_;
+  Boxed boxed_;
   proxqp::dense::QP<double> solver_;
   bool is_set_up_ = false;
 };
