@@ -55,6 +55,18 @@ class Liar final : public StructuredSolver {
   int& calls_;
 };
 
+/// What comes of `problem` where the solver lies and OSQP may take `fallback_iterations`.
+Solution lied_about(const Problem& problem, int fallback_iterations) {
+  Settings settings;
+  settings.fallback_iterations = fallback_iterations;
+  int calls = 0;
+  auto engine =
+      make_structured_engine(settings, problem.sizes, kWeight, std::make_unique<Liar>(problem.sizes, 0.1, calls));
+  Solution solution(problem.sizes);
+  CHECK(engine->solve(problem, solution) == solution.status);
+  return solution;
+}
+
 }  // namespace
 
 TEST_CASE("ASolverThatLiesIsFoundOutAndOsqpAnswers") {
@@ -83,27 +95,18 @@ TEST_CASE("ASolverThatTellsTheTruthIsBelieved") {
 }
 
 TEST_CASE("WithoutAFallbackALieIsTold") {
-  Settings settings;
-  settings.fallback_iterations = 0;
   const Problem problem = pushed(10);
-  int calls = 0;
-  auto engine =
-      make_structured_engine(settings, problem.sizes, kWeight, std::make_unique<Liar>(problem.sizes, 0.1, calls));
-  Solution solution(problem.sizes);
-  CHECK(engine->solve(problem, solution) == QpStatus::kInaccurate);
+  const Solution solution = lied_about(problem, 0);
+  CHECK(solution.status == QpStatus::kInaccurate);
   CHECK(solution.engine == QpEngine::kStructured);
   CHECK(solution.dual_residual > kForceTolerance);
 }
 
 TEST_CASE("ABudgetThatIsTooSmallForBothIsTold") {
-  Settings settings;
-  settings.fallback_iterations = 1;
   const Problem problem = pushed(10);
-  int calls = 0;
-  auto engine =
-      make_structured_engine(settings, problem.sizes, kWeight, std::make_unique<Liar>(problem.sizes, 0.1, calls));
-  Solution solution(problem.sizes);
-  CHECK(engine->solve(problem, solution) == QpStatus::kMaxIterations);
+  const Solution solution = lied_about(problem, 1);
+  CHECK(solution.status == QpStatus::kMaxIterations);
+  CHECK(solution.engine == QpEngine::kOsqpCondensed);
   CHECK(solution.iterations == 1);
 }
 
