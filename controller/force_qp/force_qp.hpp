@@ -78,8 +78,13 @@ class ForceQp {
  public:
   virtual ~ForceQp() = default;
   /// Forces of `problem` into `solution`; forces are usable only where the status is kSolved. Warm-starts from the last
-  /// solve.
-  virtual QpStatus solve(const Problem& problem, Solution& solution) noexcept = 0;
+  /// solve. `time_left` [s], to the deadline of whoever asks, bounds a second engine's iterations; nobody reads a
+  /// clock.
+  virtual QpStatus solve(const Problem& problem, Solution& solution, double time_left) noexcept = 0;
+  /// With a whole control period left.
+  QpStatus solve(const Problem& problem, Solution& solution) noexcept {
+    return solve(problem, solution, kControlPeriod);
+  }
   /// Forgets the last solve: the next starts cold.
   virtual void reset() noexcept = 0;
 };

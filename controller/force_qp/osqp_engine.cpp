@@ -20,10 +20,11 @@ constexpr double kActive = 1e-5;           // of a constraint that counts as act
 bool is_exact(const Residuals& residuals) noexcept { return residuals.primal <= kExact && residuals.dual <= kExact; }
 
 template <int NU>
-class OsqpEngine final : public ForceQp {
+class OsqpEngine final : public OsqpForceQp {
  public:
   OsqpEngine(const Settings& settings, Sizes sizes, double typical_force)
-      : settings_(settings),
+      : OsqpForceQp(settings.max_iterations),
+        settings_(settings),
         sizes_(sizes),
         typical_force_(typical_force),
         form_(settings.engine == QpEngine::kOsqpSparse ? make_sparse_form(sizes, typical_force, settings)
@@ -35,7 +36,7 @@ class OsqpEngine final : public ForceQp {
         activity_(static_cast<std::size_t>(sizes.num_stages)),
         candidate_(sizes) {}
 
-  QpStatus solve(const Problem& problem, Solution& solution) noexcept override {
+  QpStatus solve_within(const Problem& problem, Solution& solution, int max_iterations) noexcept override {
     solution.engine = settings_.engine;
     solution.iterations = 0;
     solution.primal_residual = 0.0;
@@ -43,7 +44,9 @@ class OsqpEngine final : public ForceQp {
     solution.active = 0;
     solution.status = inspect(problem, sizes_);
     if (solution.status == QpStatus::kSolved) {
-      solution.status = take_over(problem) ? solve_inspected(problem, solution) : QpStatus::kInvalidProblem;
+      solution.status = take_over(problem)
+                            ? solve_inspected(problem, solution, std::min(max_iterations, max_iterations_))
+                            : QpStatus::kInvalidProblem;
     }
     if (solution.status == QpStatus::kSolved) {
       solution.active = count_active(problem, 0, solution.forces.front(), kActive * typical_force_);
@@ -80,7 +83,7 @@ class OsqpEngine final : public ForceQp {
     return residuals;
   }
 
-  QpStatus solve_inspected(const Problem& problem, Solution& solution) noexcept {
+  QpStatus solve_inspected(const Problem& problem, Solution& solution, int max_iterations) noexcept {
     // Step 1
     free_.solve(problem, solution.forces);
     const Residuals residuals = check(problem, solution);
@@ -97,13 +100,13 @@ class OsqpEngine final : public ForceQp {
     warm_start(problem, solution.forces);
     const double coarse = std::max(kCoarseTolerance, settings_.tolerance);
     for (const double tolerance : {settings_.correct_active_set ? coarse : settings_.tolerance, settings_.tolerance}) {
-      const OsqpSolver::Outcome outcome = form_->solve(tolerance, settings_.max_iterations - solution.iterations);
+      const OsqpSolver::Outcome outcome = form_->solve(tolerance, max_iterations - solution.iterations);
       solution.iterations += outcome.iterations;
       form_->forces(problem, solution.forces);
       check(problem, solution);
       if (outcome.status != QpStatus::kSolved) return outcome.status;
       if (settings_.correct_active_set && correct_active_set(problem, solution)) return QpStatus::kSolved;
-      if (tolerance <= settings_.tolerance || solution.iterations >= settings_.max_iterations) break;
+      if (tolerance <= settings_.tolerance || solution.iterations >= max_iterations) break;
     }
     const bool accurate = solution.primal_residual <= settings_.max_primal_residual &&
                           solution.dual_residual <= settings_.max_dual_residual;
@@ -181,7 +184,17 @@ class OsqpEngine final : public ForceQp {
 
 }  // namespace
 
-std::unique_ptr<ForceQp> make_osqp_engine(const Settings& settings, Sizes sizes, double typical_force) {
+int affordable_iterations(const Settings& settings, Sizes sizes, double time_left) noexcept {
+  constexpr double kRestOfTick = 1e-3;  // s
+  constexpr double kCall = 50e-6;       // s, of one contact in one stage
+  constexpr double kIteration = 0.7e-6;
+  const double contacts = sizes.num_contacts * sizes.num_stages;
+  const double iterations = (time_left - kRestOfTick - kCall * contacts) / (kIteration * contacts);
+  return iterations < settings.check_interval ? 0
+                                              : static_cast<int>(std::min<double>(iterations, settings.max_iterations));
+}
+
+std::unique_ptr<OsqpForceQp> make_osqp_engine(const Settings& settings, Sizes sizes, double typical_force) {
   switch (sizes.num_contacts) {
     case 1:
       return std::make_unique<OsqpEngine<3>>(settings, sizes, typical_force);

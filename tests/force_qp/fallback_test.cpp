@@ -3,6 +3,7 @@
 #include <catch2/catch_test_macros.hpp>
 #include <limits>
 
+#include "controller/force_qp/osqp_engine.hpp"
 #include "controller/force_qp/structured/structured.hpp"
 #include "tests/force_qp/problems.hpp"
 #include "tests/force_qp/reference_solver.hpp"
@@ -55,15 +56,15 @@ class Liar final : public StructuredSolver {
   int& calls_;
 };
 
-/// What comes of `problem` where the solver lies and OSQP may take `fallback_iterations`.
-Solution lied_about(const Problem& problem, int fallback_iterations) {
+/// What comes of `problem` where the solver lies and OSQP may take `fallback_iterations`, with `time_left` [s].
+Solution lied_about(const Problem& problem, int fallback_iterations, double time_left = kControlPeriod) {
   Settings settings;
   settings.fallback_iterations = fallback_iterations;
   int calls = 0;
   auto engine =
       make_structured_engine(settings, problem.sizes, kWeight, std::make_unique<Liar>(problem.sizes, 0.1, calls));
   Solution solution(problem.sizes);
-  CHECK(engine->solve(problem, solution) == solution.status);
+  CHECK(engine->solve(problem, solution, time_left) == solution.status);
   return solution;
 }
 
@@ -108,6 +109,37 @@ TEST_CASE("ABudgetThatIsTooSmallForBothIsTold") {
   CHECK(solution.status == QpStatus::kMaxIterations);
   CHECK(solution.engine == QpEngine::kOsqpCondensed);
   CHECK(solution.iterations == 1);
+}
+
+TEST_CASE("WhereItIsTooLateForOsqpItDoesNotBegin") {
+  const Problem problem = pushed(10);
+  for (const double time_left : {-0.01, 0.0, 0.001, 0.002}) {
+    const Solution solution = lied_about(problem, 200, time_left);
+    CHECK(solution.status == QpStatus::kInaccurate);
+    CHECK(solution.engine == QpEngine::kStructured);
+  }
+  CHECK(lied_about(problem, 200, 0.003).engine == QpEngine::kOsqpCondensed);
+}
+
+TEST_CASE("WithLittleTimeLeftOsqpIsStoppedWhereItMustEnd") {
+  Settings settings;
+  const Problem problem = walking(50, 0, 0.2);
+  int last = settings.max_iterations;
+  for (const double time_left : {0.01, 0.009, 0.008, 0.007}) {
+    const int affordable = affordable_iterations(settings, problem.sizes, time_left);
+    CHECK(affordable < last);
+    last = affordable;
+    settings.engine = QpEngine::kOsqpSparse;
+    auto engine = make_osqp_engine(settings, problem.sizes, kWeight);
+    Problem hard = problem;
+    std::mt19937_64 random(31);
+    disturb(hard, 60.0, random);
+    Solution solution(problem.sizes);
+    static_cast<void>(engine->solve_within(hard, solution, affordable));
+    CHECK(solution.iterations <= affordable);
+  }
+  CHECK(affordable_iterations(settings, problem.sizes, 0.005) == 0);
+  CHECK(affordable_iterations(settings, problem.sizes, 1.0) == settings.max_iterations);
 }
 
 TEST_CASE("ABudgetThatIsTooSmallForTheSolverIsOsqpsChance") {

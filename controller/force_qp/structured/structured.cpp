@@ -309,14 +309,14 @@ class Solver final : public StructuredSolver {
 
 constexpr double kExact = 1e-6;  // N, residuals of a solution that is exact but for rounding
 constexpr int kMaxRefinements = 2;
-constexpr double kActive = 1e-5;         // of a constraint that counts as active, relative to the typical force
-constexpr int kMaxCondensedStages = 20;  // up to which OSQP is faster without the states
+constexpr double kActive = 1e-5;           // of a constraint that counts as active, relative to the typical force
+constexpr int kMaxCondensedContacts = 40;  // of all stages, up to which OSQP is faster without the states
 
-std::unique_ptr<ForceQp> make_fallback(Settings settings, Sizes sizes, double typical_force) {
-  if (settings.fallback_iterations == 0) return nullptr;
-  settings.engine = sizes.num_stages <= kMaxCondensedStages ? QpEngine::kOsqpCondensed : QpEngine::kOsqpSparse;
+Settings fallback_settings(Settings settings, Sizes sizes) {
+  const bool condensed = sizes.num_stages * sizes.num_contacts <= kMaxCondensedContacts;
+  settings.engine = condensed ? QpEngine::kOsqpCondensed : QpEngine::kOsqpSparse;
   settings.max_iterations = std::min(settings.max_iterations, settings.fallback_iterations);
-  return make_osqp_engine(settings, sizes, typical_force);
+  return settings;
 }
 
 class Engine final : public ForceQp {
@@ -325,11 +325,13 @@ class Engine final : public ForceQp {
       : sizes_(sizes),
         typical_force_(typical_force),
         solver_(std::move(solver)),
-        fallback_(make_fallback(settings, sizes, typical_force)),
+        fallback_settings_(fallback_settings(settings, sizes)),
+        fallback_(settings.fallback_iterations == 0 ? nullptr
+                                                    : make_osqp_engine(fallback_settings_, sizes, typical_force)),
         kkt_(sizes),
         taken_over_(sizes) {}
 
-  QpStatus solve(const Problem& problem, Solution& solution) noexcept override {
+  QpStatus solve(const Problem& problem, Solution& solution, double time_left) noexcept override {
     solution.engine = QpEngine::kStructured;
     solution.iterations = 0;
     solution.primal_residual = 0.0;
@@ -346,7 +348,9 @@ class Engine final : public ForceQp {
       return solution.status;
     }
     reset();
-    return fallback_ == nullptr ? solution.status : fallback_->solve(problem, solution);
+    if (fallback_ == nullptr) return solution.status;
+    const int affordable = affordable_iterations(fallback_settings_, sizes_, time_left);
+    return affordable == 0 ? solution.status : fallback_->solve_within(problem, solution, affordable);
   }
 
   void reset() noexcept override {
@@ -383,7 +387,8 @@ class Engine final : public ForceQp {
   Sizes sizes_;
   double typical_force_;  ///< N
   std::unique_ptr<StructuredSolver> solver_;
-  std::unique_ptr<ForceQp> fallback_;  ///< may be none
+  Settings fallback_settings_;
+  std::unique_ptr<OsqpForceQp> fallback_;  ///< may be none
   KktCheck kkt_;
   Problem taken_over_;
   bool is_factored_ = false;  ///< with taken_over_'s matrices

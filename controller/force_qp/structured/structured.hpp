@@ -85,9 +85,9 @@ std::unique_ptr<StructuredSolver> make_structured_solver(Sizes sizes, double typ
                                                          Simd simd = available_simd().back());
 
 /// The engine: inspection, solver, independent check. What the check finds not exact is refined; where that does not
-/// help, or the solver gives up, OSQP solves the same problem in at most `settings.fallback_iterations` (none: 0), and
-/// the solution says that it was OSQP. Where OSQP fails too, the status is OSQP's. A problem that inspection refuses
-/// reaches neither.
+/// help, or the solver gives up, OSQP solves the same problem in at most `settings.fallback_iterations` and what the
+/// time left affords (osqp_engine.hpp), and the solution says that it was OSQP. Where OSQP fails too, the status is
+/// OSQP's; where it may not begin, it is the solver's. A problem that inspection refuses reaches neither.
 std::unique_ptr<ForceQp> make_structured_engine(const Settings& settings, Sizes sizes, double typical_force,
                                                 Simd simd = available_simd().back());
 /// The same around any solver: what the engine trusts is the check.
