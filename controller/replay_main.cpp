@@ -34,6 +34,7 @@ struct Recording {
   std::map<std::string, std::map<std::int64_t, Payload>, std::less<>> published;  // by channel and tick
   Named<std::pair<std::int64_t, std::int64_t>> states;                            // by run and seq
   Named<std::int64_t> user_commands, stops, balls, calibrations;                  // by seq
+  std::map<std::int64_t, std::int32_t> time_left_us;                              // by tick, where it was told
 };
 
 template <typename Key>
@@ -65,6 +66,9 @@ Recording read(const std::string& file) {
     } else if (event.channel == io::channel::kCalibrationPoints) {
       CalibrationPoints points;
       if (io::decode(event.bytes, points)) keep(recording.calibrations, points.seq, payload);
+    } else if (event.channel == io::channel::kTickInput) {
+      io::TickTime input;
+      if (io::decode(event.bytes, input)) recording.time_left_us[input.seq] = input.time_left_us;
     } else if (event.channel == io::channel::kTrace) {
       io::TraceKey key;
       if (!io::decode(event.bytes, key)) continue;
@@ -84,6 +88,7 @@ struct Taken {
   const Payload* stop = nullptr;
   const Payload* ball = nullptr;
   const Payload* calibration = nullptr;
+  std::int32_t time_left_us = loop::kWholePeriodUs;
 };
 
 /// The recorded messages with the hash that the tick's trace states; nothing where the log does not hold them all.
@@ -96,6 +101,8 @@ std::optional<Taken> taken_by(const Recording& recording, const io::TraceKey& ti
     for (const Payload& payload : named->second) found.push_back(&payload);
     return found;
   };
+  const auto told = recording.time_left_us.find(tick.header.seq);
+  const std::int32_t time_left = told == recording.time_left_us.end() ? loop::kWholePeriodUs : told->second;
   const auto hash = [](const Payload* payload) { return payload == nullptr ? 0 : platform::hash(*payload); };
   std::vector<const Payload*> states{nullptr};
   if (tick.consumed.state_is_new) {
@@ -106,9 +113,10 @@ std::optional<Taken> taken_by(const Recording& recording, const io::TraceKey& ti
       for (const Payload* stop : choices(recording.stops, tick.consumed.stop_seq, true)) {
         for (const Payload* ball : choices(recording.balls, tick.consumed.ball_seq, true)) {
           for (const Payload* calibration : choices(recording.calibrations, tick.consumed.calibration_seq, true)) {
-            const loop::TakenHashes taken{hash(state), hash(user_command), hash(stop), hash(ball), hash(calibration)};
+            const loop::TakenHashes taken{hash(state), hash(user_command), hash(stop),
+                                          hash(ball),  hash(calibration),  time_left};
             if (loop::consumed_hash(taken) == tick.consumed.hash) {
-              return Taken{state, user_command, stop, ball, calibration};
+              return Taken{state, user_command, stop, ball, calibration, time_left};
             }
           }
         }
@@ -144,7 +152,8 @@ Outcome verify(const Recording& recording) {
                            std::to_string(tick.header.state_seq) + ", user command " +
                            std::to_string(tick.consumed.user_command_seq) + ", stop " +
                            std::to_string(tick.consumed.stop_seq) + ", ball " + std::to_string(tick.consumed.ball_seq) +
-                           ", calibration points " + std::to_string(tick.consumed.calibration_seq) + ", as they were";
+                           ", calibration points " + std::to_string(tick.consumed.calibration_seq) +
+                           ", as they were, and the time that it had";
       break;
     }
     if (taken->state != nullptr) static_cast<void>(ticker.offer_state(*taken->state));
@@ -152,7 +161,7 @@ Outcome verify(const Recording& recording) {
     if (taken->stop != nullptr) static_cast<void>(ticker.offer_stop(*taken->stop));
     if (taken->ball != nullptr) static_cast<void>(ticker.offer_ball(*taken->ball));
     if (taken->calibration != nullptr) static_cast<void>(ticker.offer_calibration(*taken->calibration));
-    ticker.tick(tick.consumed.periods, clock);
+    ticker.tick(tick.consumed.periods, clock, taken->time_left_us);
     ++outcome.ticks;
 
     for (const loop::Published& replayed : ticker.published()) {

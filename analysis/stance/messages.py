@@ -28,6 +28,7 @@ CHANNELS = {
     "CATCH_PLAN": "catch_plan_t",
     "CONTROLLER_TRACE": "controller_trace_t",
     "CONTROLLER_TIMING": "controller_timing_t",
+    "TICK_INPUT": "tick_input_t",
     "RUN_INFO_SIMULATOR": "run_info_t",
     "RUN_INFO_CONTROLLER": "run_info_t",
 }

@@ -262,14 +262,15 @@ struct CatchPlan {
 
 /// What a tick is given. Everything that a decision may depend on is here, so that a log of it replays bit for bit.
 struct TickInput {
-  RobotState state;               ///< the newest, as it came: not yet validated
-  bool state_is_new = false;      ///< not given to an earlier tick
-  int periods = 1;                ///< control periods since the last tick: more than 1 after a miss
-  UserCommand user_command;       ///< the newest, as it came; seq 0 before the first
-  bool operator_stop = false;     ///< a stop_t has arrived in this run
-  BallObservation ball;           ///< the newest, as it came; seq 0 before the first
-  bool ball_is_new = false;       ///< not given to an earlier tick
-  CalibrationPoints calibration;  ///< the newest, as they came; seq 0 before the first
+  RobotState state;                   ///< the newest, as it came: not yet validated
+  bool state_is_new = false;          ///< not given to an earlier tick
+  int periods = 1;                    ///< control periods since the last tick: more than 1 after a miss
+  double time_left = kControlPeriod;  ///< s, from the tick's start to the next one's deadline, on a grid
+  UserCommand user_command;           ///< the newest, as it came; seq 0 before the first
+  bool operator_stop = false;         ///< a stop_t has arrived in this run
+  BallObservation ball;               ///< the newest, as it came; seq 0 before the first
+  bool ball_is_new = false;           ///< not given to an earlier tick
+  CalibrationPoints calibration;      ///< the newest, as they came; seq 0 before the first
 };
 
 /// Each robot fills what it publishes (loop::Controller), and the command and the trace.

@@ -13,6 +13,7 @@
 #include <stance_msgs/joint_command_t.hpp>
 #include <stance_msgs/robot_state_t.hpp>
 #include <stance_msgs/stop_t.hpp>
+#include <stance_msgs/tick_input_t.hpp>
 #include <stance_msgs/user_command_t.hpp>
 
 namespace stance::io {
@@ -29,6 +30,7 @@ using stance_msgs::force_plan_t;
 using stance_msgs::joint_command_t;
 using stance_msgs::robot_state_t;
 using stance_msgs::stop_t;
+using stance_msgs::tick_input_t;
 using stance_msgs::user_command_t;
 
 static_assert(robot_state_t::MAX_JOINTS == kMaxJoints && robot_state_t::MAX_CONTACTS == kMaxContacts &&
@@ -149,6 +151,13 @@ bool decode(Bytes bytes, TraceKey& out) noexcept {
                   message.ball_seq,
                   message.calibration_seq,
                   static_cast<std::uint64_t>(message.consumed_hash)};
+  return true;
+}
+
+bool decode(Bytes bytes, TickTime& out) noexcept {
+  tick_input_t message{};
+  if (!decode_whole(bytes, message)) return false;
+  out = {message.seq, message.time_left_us};
   return true;
 }
 
@@ -323,6 +332,13 @@ void encode(const Header& header, const Timing& timing, Message& out) noexcept {
   message.state_age_us = timing.state_age_us;
   message.missed_ticks = timing.missed_ticks;
   message.dropped_states = timing.dropped_states;
+  encode_whole(message, out);
+}
+
+void encode(const Header& header, std::int32_t time_left_us, Message& out) noexcept {
+  tick_input_t message{};
+  set_header(header, message);
+  message.time_left_us = time_left_us;
   encode_whole(message, out);
 }
 

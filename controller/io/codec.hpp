@@ -27,6 +27,7 @@ inline constexpr const char* kBallEstimate = "BALL_ESTIMATE";
 inline constexpr const char* kCatchPlan = "CATCH_PLAN";
 inline constexpr const char* kTrace = "CONTROLLER_TRACE";
 inline constexpr const char* kTiming = "CONTROLLER_TIMING";
+inline constexpr const char* kTickInput = "TICK_INPUT";
 inline constexpr const char* kRunInfo = "RUN_INFO_CONTROLLER";
 }  // namespace channel
 
@@ -81,6 +82,12 @@ struct TraceKey {
   Consumed consumed;
 };
 [[nodiscard]] bool decode(Bytes bytes, TraceKey& out) noexcept;
+/// What a tick was given that no other message told.
+struct TickTime {
+  std::int64_t seq = 0;           ///< the tick
+  std::int32_t time_left_us = 0;  ///< us
+};
+[[nodiscard]] bool decode(Bytes bytes, TickTime& out) noexcept;
 /// The tick that a message of one of the controller's channels is of, but for the trace; nothing for another channel or
 /// broken bytes.
 std::optional<std::int64_t> tick_of(std::string_view channel, Bytes bytes) noexcept;
@@ -102,5 +109,7 @@ void encode(const Header& header, const BallEstimate& ball, Message& out) noexce
 void encode(const Header& header, const CatchPlan& plan, Message& out) noexcept;
 void encode(const Header& header, const Consumed& consumed, const Trace& trace, Message& out) noexcept;
 void encode(const Header& header, const Timing& timing, Message& out) noexcept;
+/// A TICK_INPUT; `time_left_us` [us].
+void encode(const Header& header, std::int32_t time_left_us, Message& out) noexcept;
 
 }  // namespace stance::io

@@ -71,7 +71,7 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
   const auto state_wait_ns = static_cast<std::int64_t>(config.state_wait * 1e9);
   WallClock clock;
   io::Timing& timing = clock.timing();
-  io::Message timing_message;
+  io::Message timing_message, input_message;
   std::int64_t deadline_ns = 0;
   std::int64_t run_id = 0;
   bool running = false;
@@ -98,8 +98,11 @@ void run_real_time(Ticker& ticker, io::Transport& transport, const std::vector<s
     }
     clock.start();
     timing.state_age_us = static_cast<double>(timing.start_utime) - static_cast<double>(ticker.state().utime);
-    ticker.tick(periods, clock);
+    const std::int32_t time_left = time_left_us(deadline_ns + kPeriodNs - platform::monotonic_ns());
+    ticker.tick(periods, clock, time_left);
     for (const Published& out : ticker.published()) transport.publish(out.channel, out.message.bytes());
+    io::encode(ticker.header(), time_left, input_message);
+    transport.publish(io::channel::kTickInput, input_message.bytes());
     clock.finish();
 
     if (ticker.state().run_id != run_id) {

@@ -9,8 +9,9 @@
 namespace stance::loop {
 namespace {
 
-constexpr std::uint64_t kPeriodUs = 10'000;
+constexpr std::uint64_t kPeriodUs = kWholePeriodUs;
 static_assert(kPeriodUs * 1e-6 == kControlPeriod);
+constexpr std::int64_t kTimeLeftGridUs = 500;
 
 }  // namespace
 
@@ -19,10 +20,19 @@ int periods_between(std::int64_t utime, std::int64_t next_utime) noexcept {
   return static_cast<int>(std::clamp(periods, 1.0, 1e6));
 }
 
+std::int32_t time_left_us(std::int64_t ns) noexcept {
+  const std::int64_t us = std::clamp<std::int64_t>(ns / 1000, 0, kWholePeriodUs);
+  return static_cast<std::int32_t>(us / kTimeLeftGridUs * kTimeLeftGridUs);
+}
+
 std::uint64_t consumed_hash(const TakenHashes& taken) noexcept {
   std::uint64_t hash = platform::kHashSeed;
   for (const std::uint64_t part : {taken.state, taken.user_command, taken.stop, taken.ball, taken.calibration}) {
     hash = platform::hash_step(hash, part);
+  }
+  // A whole period is what every tick had before some had less: those logs' hashes hold.
+  if (taken.time_left_us != kWholePeriodUs) {
+    hash = platform::hash_step(hash, static_cast<std::uint64_t>(taken.time_left_us));
   }
   return hash;
 }
@@ -90,14 +100,16 @@ bool Ticker::offer_calibration(io::Bytes bytes) noexcept {
   return true;
 }
 
-void Ticker::tick(int periods, StageClock& clock) noexcept {
+void Ticker::tick(int periods, StageClock& clock, std::int32_t time_left_us) noexcept {
   if (starts_run(header_.run_id, header_.state_seq, input_.state)) end_run();
   consumed_.periods = periods;
+  hashes_.time_left_us = time_left_us;
   consumed_.hash = consumed_hash(hashes_);
   late_periods_ = consumed_.state_is_new ? 0 : late_periods_ + periods;
   input_.state_is_new = consumed_.state_is_new;
   input_.periods = periods;
   input_.ball_is_new = hashes_.ball != 0;
+  input_.time_left = 1e-6 * time_left_us;
   clock.stamp(Stage::kDecode);
   controller_.tick(input_, clock, output_);
 

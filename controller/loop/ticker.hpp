@@ -42,9 +42,16 @@ struct Published {
 /// Control periods from one state's stamp to the next one's, at least 1.
 int periods_between(std::int64_t utime, std::int64_t next_utime) noexcept;
 
-/// Of the messages that a tick took anew, 0 for none.
+inline constexpr std::int32_t kWholePeriodUs = 10'000;
+
+/// TickInput::time_left [us] on its grid of 0.5 ms, of `ns` [ns] to the next tick's deadline; rounded down, so that a
+/// tick has at least what it is told.
+std::int32_t time_left_us(std::int64_t ns) noexcept;
+
+/// Of the messages that a tick took anew, 0 for none; and its time left [us].
 struct TakenHashes {
   std::uint64_t state = 0, user_command = 0, stop = 0, ball = 0, calibration = 0;
+  std::int32_t time_left_us = kWholePeriodUs;
 };
 /// Consumed::hash.
 std::uint64_t consumed_hash(const TakenHashes& taken) noexcept;
@@ -64,8 +71,8 @@ class Ticker {
   bool has_new_state() const noexcept { return consumed_.state_is_new; }
   const RobotState& state() const noexcept { return input_.state; }
 
-  /// Runs the tick, `periods` control periods after the last one.
-  void tick(int periods, StageClock& clock) noexcept;
+  /// Runs the tick, `periods` control periods after the last one, with `time_left_us` [us] to the next one's deadline.
+  void tick(int periods, StageClock& clock, std::int32_t time_left_us = kWholePeriodUs) noexcept;
 
   const io::Header& header() const noexcept { return header_; }
   const TickOutput& output() const noexcept { return output_; }

@@ -62,7 +62,7 @@ double BipedRig::tilt() const {
 
 void BipedRig::answer() {
   loop::NoClock clock;
-  ticker.tick(1, clock);
+  ticker.tick(1, clock, time_left_us);
   for (const auto& [channel, message] : ticker.published()) {
     if (std::string_view(channel) != io::channel::kForcePlan) continue;
     simulator.accept(decoded<stance_msgs::force_plan_t>(message.bytes()));

@@ -68,6 +68,7 @@ class BipedRig {
   config::RobotDescription robot;
   sim::Simulator simulator;
   loop::Ticker ticker;
+  std::int32_t time_left_us = loop::kWholePeriodUs;  ///< that the ticks are told
 
  private:
   void answer();

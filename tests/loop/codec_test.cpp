@@ -13,6 +13,7 @@
 #include <stance_msgs/robot_state_t.hpp>
 #include <stance_msgs/run_info_t.hpp>
 #include <stance_msgs/stop_t.hpp>
+#include <stance_msgs/tick_input_t.hpp>
 #include <stance_msgs/user_command_t.hpp>
 #include <string>
 #include <type_traits>
@@ -477,6 +478,23 @@ TEST_CASE("EveryFieldOfATimingIsEncodedAndItsTimeIsTheTicksStart") {
   CHECK(m.state_age_us == timing.state_age_us);
   CHECK(m.missed_ticks == timing.missed_ticks);
   CHECK(m.dropped_states == timing.dropped_states);
+}
+
+TEST_CASE("WhatATickWasGivenBesidesComesBack") {
+  Message bytes;
+  encode(kHeader, 3'500, bytes);
+  const auto m = whole<stance_msgs::tick_input_t>(bytes);
+  CHECK(m.utime == kHeader.utime);
+  CHECK(m.seq == kHeader.seq);
+  CHECK(m.state_seq == kHeader.state_seq);
+  CHECK(m.run_id == kHeader.run_id);
+  CHECK(m.time_left_us == 3'500);
+  TickTime input;
+  CHECK_FALSE(decode(bytes.bytes().first(bytes.size - 1), input));
+  CHECK(input.seq == 0);
+  REQUIRE(decode(bytes.bytes(), input));
+  CHECK(input.seq == kHeader.seq);
+  CHECK(input.time_left_us == 3'500);
 }
 
 TEST_CASE("TheTickOfAMessageIsToldOnItsOwnChannelOnly") {

@@ -15,6 +15,7 @@
 #include <stance_msgs/force_plan_t.hpp>
 #include <stance_msgs/joint_command_t.hpp>
 #include <stance_msgs/stop_t.hpp>
+#include <stance_msgs/tick_input_t.hpp>
 #include <stop_token>
 #include <string>
 #include <thread>
@@ -62,7 +63,7 @@ class Watchdog {
 struct Bench {
   explicit Bench(Controller controller = compose(test::biped())) : ticker(std::move(controller)) {
     for (const char* name : {io::channel::kForcePlan, io::channel::kJointCommand, io::channel::kTrace,
-                             io::channel::kTiming, io::channel::kRunInfo}) {
+                             io::channel::kTiming, io::channel::kTickInput, io::channel::kRunInfo}) {
       transport.subscribe(name, [this, name](io::Bytes bytes) {
         order.emplace_back(name);
         published[name].emplace_back(bytes.begin(), bytes.end());
@@ -373,10 +374,12 @@ TEST_CASE("InRealTimeEveryTickNamesAStateAndAnswersComeInOrder") {
   const auto commands = bench.all<joint_command_t>(io::channel::kJointCommand);
   const auto plans = bench.all<force_plan_t>(io::channel::kForcePlan);
   const auto timings = bench.all<controller_timing_t>(io::channel::kTiming);
+  const auto inputs = bench.all<stance_msgs::tick_input_t>(io::channel::kTickInput);
   REQUIRE_FALSE(traces.empty());
   REQUIRE(commands.size() == traces.size());
   REQUIRE(plans.size() == traces.size());
   REQUIRE(timings.size() == traces.size());
+  REQUIRE(inputs.size() == traces.size());
   std::int64_t last_state = 1;
   for (std::size_t k = 0; k < traces.size(); ++k) {
     CAPTURE(k);
@@ -386,7 +389,11 @@ TEST_CASE("InRealTimeEveryTickNamesAStateAndAnswersComeInOrder") {
     CHECK(trace.state_seq >= last_state);
     CHECK(trace.state_is_new == (k == 0 || trace.state_seq > last_state ? 1 : 0));
     CHECK(trace.periods >= 1);
-    for (const std::int64_t seq : {commands[k].seq, plans[k].seq, timings[k].seq}) CHECK(seq == trace.seq);
+    for (const std::int64_t seq : {commands[k].seq, plans[k].seq, timings[k].seq, inputs[k].seq}) {
+      CHECK(seq == trace.seq);
+    }
+    CHECK(inputs[k].time_left_us >= 0);
+    CHECK(inputs[k].time_left_us <= 1e4 - timings[k].wake_latency_us);
     for (const std::int64_t seq : {commands[k].state_seq, plans[k].state_seq, timings[k].state_seq}) {
       CHECK(seq == trace.state_seq);
     }

@@ -222,6 +222,30 @@ TEST_CASE("TheHashCoversEveryByteThatATickConsumedAndNothingElse") {
   }
 }
 
+TEST_CASE("ATickIsGivenItsTimeLeftWhichItsHashCovers") {
+  std::set<std::int64_t> different;
+  for (const std::int32_t time_left : {kWholePeriodUs, 9'500, 500, 0}) {
+    Bench bench;
+    REQUIRE(bench.ticker.offer_state(state(1)));
+    bench.ticker.tick(1, bench.clock, time_left);
+    CHECK(bench.inputs.back().time_left == 1e-6 * time_left);
+    CHECK(different.insert(decoded<controller_trace_t>(bench.ticker.trace().bytes()).consumed_hash).second);
+  }
+  Bench untold;
+  untold.tick_with(state(1));
+  CHECK(untold.inputs.back().time_left == kControlPeriod);
+  CHECK_FALSE(different.insert(untold.trace.consumed_hash).second);
+}
+
+TEST_CASE("TheTimeLeftIsRoundedDownToItsGridWithinAPeriod") {
+  CHECK(time_left_us(-1) == 0);
+  CHECK(time_left_us(499'999) == 0);
+  CHECK(time_left_us(500'000) == 500);
+  CHECK(time_left_us(9'999'999) == 9'500);
+  CHECK(time_left_us(10'000'000) == 10'000);
+  CHECK(time_left_us(12'000'000) == 10'000);
+}
+
 TEST_CASE("TheSameSequenceGivesTheSameBytes") {
   sim::Scenario scenario = test::quiet_stand();
   scenario.pushes = {test::push(0.1, 5.0, 30.0, 0.0)};
