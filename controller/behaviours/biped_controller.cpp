@@ -5,6 +5,7 @@
 #include <span>
 #include <stdexcept>
 
+#include "controller/behaviours/shifted_plan.hpp"
 #include "controller/planning/heading.hpp"
 
 namespace stance::behaviours {
@@ -89,6 +90,7 @@ void BipedController::step(const TickInput& input, StageClock& clock, TickOutput
   trace.qp_primal_residual = trace.qp_dual_residual = 0.0;
   trace.qp_active = 0;
   trace.torques_clipped = 0;
+  memory_.plan_age += input.periods;
   if (fresh) {
     estimate(input.periods, input.state, trace.estimate);
     clock.stamp(Stage::kEstimate);
@@ -96,12 +98,10 @@ void BipedController::step(const TickInput& input, StageClock& clock, TickOutput
     clock.stamp(Stage::kPlan);
     memory_.stepping ? walk_.model() : stand_.model();
     clock.stamp(Stage::kModel);
-    // Where it fails, the last plan's forces stay.
     if (memory_.lying) {
       give_up(SafetyMode::kDamp, out);  // the trunk comes to rest on the ground
     } else if (!ladder_.latched()) {
-      const QpStatus status = memory_.stepping ? walk_.solve(out.plan, trace) : stand_.solve(out.plan, trace);
-      if (status != QpStatus::kSolved) ladder_.report(Fault::kQpFailed);
+      make_plan(input, out);
     }
     clock.stamp(Stage::kForceQp);
     if (has_plan(out)) {
@@ -291,10 +291,30 @@ void BipedController::choose_behaviour(const WalkInput& now) noexcept {
   if (!wanted && settled) memory_.stepping = false;
 }
 
+void BipedController::make_plan(const TickInput& input, TickOutput& out) noexcept {
+  const QpStatus status = memory_.stepping ? walk_.solve(input.time_left, out.plan, out.trace)
+                                           : stand_.solve(input.time_left, out.plan, out.trace);
+  const double elapsed = kControlPeriod * static_cast<double>(memory_.plan_age);
+  if (status != QpStatus::kSolved) {
+    ladder_.report(Fault::kQpFailed);
+    if (!shift_plan(out.plan, elapsed, standing_feet())) return;  // it stays as it was, as long as the ladder holds it
+  }
+  memory_.plan_age = 0;
+}
+
+ContactFlags BipedController::standing_feet() const noexcept {
+  ContactFlags standing{};
+  for (std::size_t i = 0; i < kFeet; ++i) {
+    standing[i] = !memory_.stepping || walk_.gait().state().stance(static_cast<int>(i));
+  }
+  return standing;
+}
+
 std::array<LegTask, BipedController::kFeet> BipedController::leg_tasks(const ForcePlan& plan) const noexcept {
   std::array<LegTask, kFeet> tasks;
+  const ContactFlags standing = standing_feet();
   for (std::size_t i = 0; i < kFeet; ++i) {
-    tasks[i].stance = !memory_.stepping || walk_.gait().state().stance(static_cast<int>(i));
+    tasks[i].stance = standing[i];
     tasks[i].force_W = plan.force.front()[i];
     tasks[i].swing = walk_.gait().swing();
   }

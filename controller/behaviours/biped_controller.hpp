@@ -35,6 +35,7 @@ class BipedController {
     UserCommand user_command;           ///< last plausible one, or what is left of it when it is old
     std::int64_t user_command_age = 0;  ///< control periods since it came, by the ticks
     double yaw = 0.0;                   ///< rad, unwrapped
+    std::int64_t plan_age = 0;          ///< control periods since the plan was made or shifted
     bool standing = false;              ///< the stance has been taken up
     bool stepping = false;
     bool lying = false;  ///< let down: nothing but a new run ends it
@@ -51,6 +52,9 @@ class BipedController {
   void choose_behaviour(const WalkInput& now) noexcept;
   bool lying_down() const noexcept { return memory_.user_command.behaviour == Behaviour::kLieDown; }
   std::array<LegTask, kFeet> leg_tasks(const ForcePlan& plan) const noexcept;
+  /// The plan of this tick: solved, else the last one shifted to now.
+  void make_plan(const TickInput& input, TickOutput& out) noexcept;
+  ContactFlags standing_feet() const noexcept;
   estimation::ContactPlan contact_plan() const noexcept;
   bool follows(const RobotState& state) const noexcept;
   /// No forces: what the robot is commanded in DAMP and STOP.

@@ -92,8 +92,8 @@ void Stand::model() noexcept {
   }
 }
 
-QpStatus Stand::solve(ForcePlan& plan, Trace& trace) noexcept {
-  const QpStatus status = qp_->solve(problem_, solution_);
+QpStatus Stand::solve(double time_left, ForcePlan& plan, Trace& trace) noexcept {
+  const QpStatus status = qp_->solve(problem_, solution_, time_left);
   note(solution_, trace);
   if (status != QpStatus::kSolved) return status;
 

@@ -40,8 +40,9 @@ class Stand {
   void model() noexcept;
   /// m, where it is on its way to the wanted one.
   double height_offset() const noexcept { return height_.offset(); }
-  /// Solves; where the status is kSolved, `plan` has the forces in W and the predicted path.
-  QpStatus solve(ForcePlan& plan, Trace& trace) noexcept;
+  /// Solves, with `time_left` [s] for it; where the status is kSolved, `plan` has the forces in W and the predicted
+  /// path.
+  QpStatus solve(double time_left, ForcePlan& plan, Trace& trace) noexcept;
 
  private:
   Height height_;

@@ -172,8 +172,8 @@ void Walk::note(GaitTrace& trace) const noexcept {
   trace.slope = gait.slope;
 }
 
-QpStatus Walk::solve(ForcePlan& plan, Trace& trace) noexcept {
-  const QpStatus status = qp_->solve(problem_, solution_);
+QpStatus Walk::solve(double time_left, ForcePlan& plan, Trace& trace) noexcept {
+  const QpStatus status = qp_->solve(problem_, solution_, time_left);
   behaviours::note(solution_, trace);
   if (status != QpStatus::kSolved) return status;
   plan.num_contacts = kFeet;

@@ -46,8 +46,9 @@ class Walk {
   /// The gait's step, the reference and x of this tick.
   void plan(const WalkInput& input, TickState& out) noexcept;
   void model() noexcept;
-  /// Solves; where the status is kSolved, `plan` has the forces in W and the predicted path.
-  QpStatus solve(ForcePlan& plan, Trace& trace) noexcept;
+  /// Solves, with `time_left` [s] for it; where the status is kSolved, `plan` has the forces in W and the predicted
+  /// path.
+  QpStatus solve(double time_left, ForcePlan& plan, Trace& trace) noexcept;
 
   /// Writes what the gait is doing into the trace.
   void note(GaitTrace& trace) const noexcept;

@@ -4,6 +4,7 @@
 #include <catch2/catch_test_macros.hpp>
 #include <cmath>
 
+#include "controller/behaviours/shifted_plan.hpp"
 #include "controller/config/biped_config_yaml.hpp"
 #include "tests/loop/biped_rig.hpp"
 
@@ -161,6 +162,43 @@ TEST_CASE("ThePlanSaysWhichFeetBearAndTheSwingFootBearsNothing") {
     }
   }
   CHECK(single > kSecond);
+}
+
+TEST_CASE("WhereTheQpFailsWhileItWalksThePlanGoesOnUntilTheLadderEndsIt") {
+  // One step of either engine is enough for a quiet walk and too few for a push.
+  config::RobotDescription robot = test::biped_with("controller.force_qp.max_iterations", "1");
+  robot = config::robot_from_texts(with_engine(robot.yaml_text, "structured"), robot.urdf_text);
+  const int hold_ticks =
+      static_cast<int>(std::lround(config::biped_config(robot).fault_ladder.hold_time / kControlPeriod));
+  for (const bool too_late : {false, true}) {
+    CAPTURE(too_late);
+    sim::Scenario scenario = quiet_stand();
+    scenario.pushes = {push(2.0, 150.0, 100.0, 0.0)};
+    BipedRig rig(scenario, robot);
+    rig.time_left_us = too_late ? 500 : loop::kWholePeriodUs;
+    rig.give(walk_command(1, 0.3, 0.0, 0.0));
+    ForcePlan last;
+    int ticks = 0;
+    for (; ticks < 3 * kSecond && !rig.has(Fault::kQpFailed); ++ticks) {
+      last = rig.ticker.output().plan;
+      rig.tick();
+    }
+    REQUIRE(rig.has(Fault::kQpFailed));
+    CHECK(ticks > 2 * kSecond);
+    CHECK(rig.trace().behaviour == Behaviour::kWalk);
+    CHECK(rig.trace().qp_status == QpStatus::kMaxIterations);
+    CHECK(rig.trace().qp_engine == (too_late ? QpEngine::kStructured : QpEngine::kOsqpSparse));
+    for (int k = 0; k < hold_ticks && rig.has(Fault::kQpFailed); ++k) {
+      CHECK(rig.trace().safety == SafetyMode::kHold);
+      const ForcePlan& plan = rig.ticker.output().plan;
+      REQUIRE(shift_plan(last, kControlPeriod, plan.contact.front()));
+      CHECK(plan.num_stages == last.num_stages);
+      CHECK(plan.stage_duration == last.stage_duration);
+      CHECK(plan.force == last.force);
+      CHECK(plan.p_WC == last.p_WC);
+      rig.tick();
+    }
+  }
 }
 
 TEST_CASE("WhereUserCommandsCeaseItStopsAndStands") {
