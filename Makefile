@@ -8,13 +8,14 @@ PYTHON := .venv/bin/python
 STUDIES ?= $(notdir $(basename $(wildcard sim/scenarios/$(ROBOT)/studies/*.yaml)))
 CPP = $$(find controller sim rollout tests -name '*.[ch]pp')
 
-.PHONY: help setup peers build programs test demo check check-asan check-tsan check-debug lint bench format lock clean studies
+.PHONY: help setup peers bench-peers build programs test demo check check-asan check-tsan check-debug lint bench fuzz format lock clean studies
 
 help:
 	@echo "make demo    $(ROBOT) in scenario '$(SCENARIO)' over LCM: log, report, plots, verdict (ROBOT=..., SCENARIO=...)"
 	@echo "make test    build, and every test"
 	@echo "make check   lint, and the tests in debug, under address, undefined-behaviour and thread sanitizers"
 	@echo "make bench   the benchmarks; make build; make format; make clean"
+	@echo "make fuzz    100,000 random force QPs and as many byte strings, beside DAQP (PROBLEMS=..., BYTES=...)"
 	@echo "make studies the studies of the README, which takes about an hour (TRIALS=... of each cell, STUDIES=...)"
 
 setup:
@@ -50,13 +51,22 @@ check-debug check-asan check-tsan: check-%:
 	@$(MAKE) --no-print-directory build PRESET=$*
 	ctest --preset $*
 
-bench: peers
+bench-peers: setup
 	@setup/bench_peers.sh
+
+bench: peers bench-peers
 	@$(MAKE) --no-print-directory build
 	@cmake --build --preset $(PRESET) --parallel $(JOBS) --target bench_force_qp bench_rigid_body
 	build/release/bin/bench_force_qp
 	build/release/bin/bench_rigid_body
 	$(PYTHON) tests/bench/tick.py
+
+PROBLEMS ?= 100000
+BYTES ?= 100000
+fuzz: bench-peers
+	@cmake --preset $(PRESET) > /dev/null
+	@cmake --build --preset $(PRESET) --parallel $(JOBS) --target fuzz_force_qp
+	build/$(PRESET)/bin/fuzz_force_qp --problems $(PROBLEMS) --bytes $(BYTES)
 
 # Every study, on seeds that no tuning has seen; the README's table is drawn from what they come to. TRIALS of each cell, else
 # the studies' own. What was done is not done again.

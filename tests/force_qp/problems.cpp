@@ -101,6 +101,51 @@ Problem walking(int num_stages, int tick, double friction) {
   return problem;
 }
 
+Problem any_problem(Sizes sizes, std::mt19937_64& random) {
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(0.0, 1.0);
+  const auto matrix = [&](auto block, double scale) {
+    for (Eigen::Index i = 0; i < block.size(); ++i) block(i) = scale * normal(random);
+  };
+  Problem problem(sizes);
+  problem.friction = 0.05 + 1.45 * uniform(random);
+  matrix(problem.x0.head(12), 0.2);
+  for (StageData& stage : problem.stages) {
+    const double dt = uniform(random) < 0.5 ? 0.01 : 0.03;
+    Dynamics& dynamics = stage.dynamics;
+    dynamics.A.setIdentity();
+    Matrix3 block;
+    const auto any = [&](double scale) -> const Matrix3& {
+      matrix(block.reshaped(), scale);
+      return block;
+    };
+    dynamics.A.block<3, 3>(0, 6) = dt * (Matrix3::Identity() + any(0.3));
+    dynamics.A.block<3, 3>(3, 9) = dt * (Matrix3::Identity() + any(0.3));
+    if (uniform(random) < 0.7) dynamics.A.block<3, 3>(6, 3) = dt * any(100.0);
+    for (int c = 0; c < sizes.num_contacts; ++c) {
+      const auto contact = static_cast<std::size_t>(c);
+      dynamics.B.block<3, 3>(6, 3 * c) = dt * any(0.5);
+      dynamics.B.block<3, 3>(9, 3 * c) = dt / kMass * (Matrix3::Identity() + any(0.1));
+      const bool stands = uniform(random) < 0.7 || (c == 0 && &stage == &problem.stages.front());
+      stage.fz_max[contact] = stands ? 20.0 + 200.0 * uniform(random) : 0.0;
+      stage.fz_min[contact] = stands && uniform(random) < 0.5 ? 0.9 * uniform(random) * stage.fz_max[contact] : 0.0;
+    }
+    matrix(dynamics.g.head(12), 0.01);
+    dynamics.g(11) -= dt * kGravity;
+    matrix(stage.x_ref.head(12), 0.1);
+    matrix(stage.f_ref.head(3 * sizes.num_contacts), 30.0);
+    for (int i = 0; i < 12; ++i) stage.Q(i) = uniform(random) < 0.2 ? 0.0 : std::pow(10.0, 3.0 * uniform(random));
+    for (int i = 0; i < 3 * sizes.num_contacts; ++i) stage.R(i) = std::pow(10.0, -3.0 * uniform(random));
+  }
+  if (uniform(random) < 0.5) {
+    StateMatrix root;
+    matrix(root.reshaped(), 10.0);
+    problem.has_terminal_cost = true;
+    problem.terminal_cost = root * root.transpose();
+  }
+  return problem;
+}
+
 void disturb(Problem& problem, double severity, std::mt19937_64& random) {
   const StateVector scale =
       (StateVector() << 0.01, 0.01, 0.01, 0.004, 0.004, 0.004, 0.05, 0.05, 0.05, 0.02, 0.02, 0.02).finished();

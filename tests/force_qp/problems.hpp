@@ -27,6 +27,9 @@ Problem standing(int num_stages, int num_contacts = 2, double friction = kFricti
 /// contacts, arms and references change over the horizon.
 Problem walking(int num_stages, int tick, double friction = kFrictionWalk);
 
+/// Any problem of the structure: every matrix, weight, bound and contact differs from stage to stage.
+Problem any_problem(Sizes sizes, std::mt19937_64& random);
+
 /// Moves x0 by a random deviation; `severity` 1 is what a standing robot sees, 10 a hard push.
 void disturb(Problem& problem, double severity, std::mt19937_64& random);
 
