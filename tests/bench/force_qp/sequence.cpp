@@ -9,6 +9,7 @@
 #include <random>
 #include <stdexcept>
 
+#include "controller/force_qp/tick_file.hpp"
 #include "controller/math/so3.hpp"
 
 namespace stance::bench {
@@ -175,8 +176,6 @@ class Reader {
   std::ifstream stream_;
 };
 
-constexpr char kMagic[] = "STANCEQ2";
-
 Sequence read_first_version(Reader& in) {
   const auto ticks = static_cast<std::size_t>(in.value<std::int32_t>());
   const auto stages = static_cast<std::size_t>(in.value<std::int32_t>());
@@ -325,10 +324,10 @@ Sequence record(const Recipe& recipe, int max_stages) {
 
 Sequence read_sequence(const std::filesystem::path& file) {
   Reader in(file);
-  char magic[8];
+  char magic[sizeof kTickFileMagic - 1];
   for (char& c : magic) c = in.value<char>();
   Sequence sequence;
-  if (std::memcmp(magic, kMagic, sizeof magic) == 0) {
+  if (std::memcmp(magic, kTickFileMagic, sizeof magic) == 0) {
     sequence = read_second_version(in);
   } else {
     in.rewind();
@@ -353,36 +352,9 @@ Sequence read_sequence(const std::filesystem::path& file) {
 
 void write_sequence(const Sequence& sequence, const std::filesystem::path& file) {
   std::ofstream out(file, std::ios::binary);
-  const auto put = [&](auto value) { out.write(reinterpret_cast<const char*>(&value), sizeof value); };
-  const auto matrix = [&](const auto& m) {
-    for (Eigen::Index i = 0; i < m.rows(); ++i) {
-      for (Eigen::Index j = 0; j < m.cols(); ++j) put(static_cast<double>(m(i, j)));
-    }
-  };
-  const Problem& first = sequence.ticks.front();
-  out.write(kMagic, 8);
-  put(static_cast<std::int32_t>(first.sizes.num_contacts));
-  put(static_cast<std::int32_t>(sequence.ticks.size()));
-  put(static_cast<std::int32_t>(first.sizes.num_stages));
-  put(static_cast<std::int32_t>(first.has_terminal_cost));
-  put(first.friction);
-  put(sequence.typical_force);
-  for (const Problem& problem : sequence.ticks) {
-    matrix(problem.x0);
-    for (const StageData& stage : problem.stages) {
-      matrix(stage.dynamics.A);
-      matrix(stage.dynamics.B);
-      matrix(stage.dynamics.g);
-      matrix(stage.x_ref);
-      matrix(stage.Q);
-      matrix(stage.f_ref);
-      matrix(stage.R);
-      for (int c = 0; c < first.sizes.num_contacts; ++c) put(stage.fz_min[static_cast<std::size_t>(c)]);
-      for (int c = 0; c < first.sizes.num_contacts; ++c) put(stage.fz_max[static_cast<std::size_t>(c)]);
-    }
-    if (first.has_terminal_cost) matrix(problem.terminal_cost);
-  }
-  if (!out.flush()) throw std::runtime_error(file.string() + ": cannot be written");
+  TickWriter writer(out, sequence.typical_force);
+  for (const Problem& problem : sequence.ticks) writer.write(problem);
+  if (!writer.finish()) throw std::runtime_error(file.string() + ": cannot be written");
 }
 
 }  // namespace stance::bench

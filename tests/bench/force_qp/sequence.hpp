@@ -38,10 +38,7 @@ Sequence record(const Recipe& recipe, int max_stages);
 ///
 /// Little-endian. First version: int32 T, M; then float64 arrays x0 (T x 12), yaw (T x M, rad), B (T x M x 12 x 6, row
 /// by row, 1/kg..), xref (T x M x 12), contact (T x M x 2, 0 or 1) and forces that are not read; mass 12 kg, mu 0.6, fz
-/// <= 250 N, the weights of `record`, dt 0.01 s. Second version: the 8 bytes "STANCEQ2", int32 n, T, N, terminal (0 or
-/// 1); float64 mu, typical force (N); then per tick x0 (12) and per stage A (12 x 12), B (12 x 3n), g, xref, Q (12
-/// each), fref, R (3n each), fz_min, fz_max (n each), matrices row by row; and at the tick's end P (12 x 12) where
-/// terminal is 1.
+/// <= 250 N, the weights of `record`, dt 0.01 s. Second version: controller/force_qp/tick_file.hpp.
 Sequence read_sequence(const std::filesystem::path& file);
 
 /// Writes the second version. Throws std::runtime_error where the file cannot be written.
