@@ -24,11 +24,7 @@ loop::TickFunction ticks_of(std::shared_ptr<Controller> controller) {
       [controller](const TickInput& input, StageClock& clock, TickOutput& out) { controller->step(input, clock, out); };
 }
 
-loop::Controller biped(const config::RobotDescription& robot) {
-  return {ticks_of(std::make_shared<behaviours::BipedController>(config::biped_config(robot), robot.model, robot.feet,
-                                                                 robot.nominal_joint_position)),
-          {loop::kForcePlan}};
-}
+loop::Controller biped(const config::RobotDescription& robot) { return compose_biped(robot).controller; }
 
 loop::Controller arm3(const config::RobotDescription& robot) {
   return {ticks_of(std::make_shared<behaviours::Arm3Controller>(config::arm3_config(robot), robot.model)),
@@ -48,6 +44,13 @@ struct Entry {
 constexpr std::array kRobots = {Entry{"biped", biped}, Entry{"arm3", arm3}, Entry{"catcher", catcher}};
 
 }  // namespace
+
+ComposedBiped compose_biped(const config::RobotDescription& robot) {
+  if (robot.name != "biped") throw config::ConfigError("the robot '" + robot.name + "' is no biped");
+  const auto biped = std::make_shared<behaviours::BipedController>(config::biped_config(robot), robot.model, robot.feet,
+                                                                   robot.nominal_joint_position);
+  return {{ticks_of(biped), {loop::kForcePlan}}, biped};
+}
 
 loop::Controller compose(const config::RobotDescription& robot) {
   const auto* const found =

@@ -3,6 +3,8 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdint>
+#include <filesystem>
+#include <fstream>
 #include <functional>
 #include <iostream>
 #include <map>
@@ -11,7 +13,9 @@
 #include <string_view>
 #include <vector>
 
+#include "controller/behaviours/biped_controller.hpp"
 #include "controller/compose.hpp"
+#include "controller/force_qp/tick_file.hpp"
 #include "controller/io/log.hpp"
 #include "controller/io/run_info.hpp"
 #include "controller/loop/wall_clock.hpp"
@@ -134,9 +138,11 @@ struct Outcome {
   std::string incomplete;            ///< why the replay ended early, empty where it did not
 };
 
-Outcome verify(const Recording& recording) {
+/// `ticked` is called after each tick with what it decided, until it is false.
+template <typename Ticked>
+Outcome verify(const Recording& recording, loop::Controller controller, const Ticked& ticked) {
   Outcome outcome;
-  loop::Ticker ticker(compose(config::robot_from_texts(recording.info.configuration, recording.info.urdf)));
+  loop::Ticker ticker(std::move(controller));
   loop::NoClock clock;
   std::int64_t expected = 1;
   for (const auto& entry : recording.ticks) {
@@ -175,7 +181,28 @@ Outcome verify(const Recording& recording) {
       ++outcome.differing;
       if (outcome.first_differing == 0) outcome.first_differing = seq;
     }
+    if (!ticked(ticker.output().trace)) break;
   }
+  return outcome;
+}
+
+/// Replays, and writes the force QPs of the first `most` ticks that step to `file`. Throws where it cannot.
+Outcome write_force_qps(const Recording& recording, const config::RobotDescription& robot, const std::string& file,
+                        int most) {
+  std::ofstream out(file, std::ios::binary);
+  force_qp::TickWriter writer(out, robot.model.total_mass * kGravity);
+  const ComposedBiped composed = compose_biped(robot);
+  const Outcome outcome = verify(recording, composed.controller, [&](const Trace& trace) {
+    if (trace.behaviour == Behaviour::kWalk && trace.qp_status != QpStatus::kNotRun) {
+      writer.write(composed.biped->stepping_problem());
+    }
+    return writer.ticks() < most;
+  });
+  const bool written = writer.finish();
+  // No file of what the log does not say.
+  if (!written || writer.ticks() == 0 || outcome.differing > 0) std::filesystem::remove(file);
+  if (!written) throw std::runtime_error(file + ": cannot be written");
+  if (writer.ticks() == 0) throw std::runtime_error("no tick of the log steps: there is no force QP over a horizon");
   return outcome;
 }
 
@@ -185,7 +212,13 @@ int main(int argc, char** argv) {
   CLI::App app{
       "Replays a log through the controller and compares all that it published but its timing, byte for byte."};
   app.set_version_flag("--version", STANCE_VERSION);
-  std::string file;
+  std::string file, qp_file;
+  int qp_ticks = 1000;
+  app.add_option("--qp", qp_file,
+                 "Writes the force QPs of the ticks that step to this file, as bench_force_qp reads them");
+  app.add_option("--qp-ticks", qp_ticks, "Of so many ticks, at most; the replay ends with the last")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
   app.add_option("LOG", file, "An LCM log of stance-controller's run")->required()->check(CLI::ExistingFile);
   try {
     app.parse(argc, argv);
@@ -199,7 +232,9 @@ int main(int argc, char** argv) {
                 << " holds no run of stance-controller (RUN_INFO_CONTROLLER and CONTROLLER_TRACE)\n";
       return 3;
     }
-    const Outcome outcome = verify(recording);
+    const auto robot = config::robot_from_texts(recording.info.configuration, recording.info.urdf);
+    const Outcome outcome = qp_file.empty() ? verify(recording, compose(robot), [](const Trace&) { return true; })
+                                            : write_force_qps(recording, robot, qp_file, qp_ticks);
     std::cout << outcome.ticks << " of " << recording.ticks.size() << " ticks replayed, " << outcome.messages
               << " messages compared, " << outcome.differing << " differ";
     if (outcome.first_differing > 0) std::cout << ", first at tick " << outcome.first_differing;

@@ -199,9 +199,14 @@ def _replay(options: argparse.Namespace) -> int:
 
 
 def _export(options: argparse.Namespace) -> int:
-    from .export import export
+    from .export import export, export_force_qps
     from .log import Log
 
+    if options.format == "qp":
+        out = options.out or options.log.with_suffix(".qp")
+        said = export_force_qps(options.log, out, options.ticks)
+        _print(options, [str(out)], lambda: f"{out}: {said}")
+        return GOOD
     run = Log.open(options.log).run(options.run)
     default = options.log.with_suffix(".mat") if options.format == "mat" else options.log.parent / options.format
     written = export(run, options.format, options.out or default)
@@ -445,9 +450,14 @@ def _parser() -> argparse.ArgumentParser:
     _add_network(replay)
 
     export = add("export", _export, "Writes a run's channels for other tools.")
-    export.add_argument("format", choices=("parquet", "csv", "mat"))
+    export.add_argument("format", choices=("parquet", "csv", "mat", "qp"))
     _add_log(export, with_run=True)
-    export.add_argument("--out", type=Path, metavar="PATH", help="a directory, or the .mat file (default: by the log)")
+    export.add_argument(
+        "--out", type=Path, metavar="PATH", help="a directory, or the .mat or .qp file (default: by the log)"
+    )
+    export.add_argument(
+        "--ticks", type=int, default=1000, metavar="N", help="qp: of the first N ticks that step (default: 1000)"
+    )
 
     campaign = add("campaign", _campaign, "Runs studies: seeded rollouts on every core; exit 1 where less than asked.")
     campaign.add_argument("--robot", default="biped", help="robots/<robot> (default: biped)")

@@ -1,12 +1,14 @@
-"""Logs in the formats of other tools: Parquet and CSV, a file per channel, and MATLAB's .mat."""
+"""Logs in the formats of other tools: Parquet and CSV, a file per channel, and MATLAB's .mat; and their force QPs."""
 
 from __future__ import annotations
 
+import subprocess
 from pathlib import Path
 
 import numpy as np
 
 from .errors import StanceError
+from .programs import find_program
 from .series import Array, Run
 
 FORMATS = ("parquet", "csv", "mat")
@@ -32,6 +34,19 @@ def export(run: Run, kind: str, out: Path) -> list[Path]:
             frame.to_csv(path, index=False)
         written.append(path)
     return written
+
+
+def export_force_qps(log: Path, out: Path, ticks: int) -> str:
+    """Writes the force QPs of the first `ticks` ticks of `log` that step, as `bench_force_qp --sequence` reads them.
+
+    They are the controller's own, computed again from the log by `stance-replay`, which compares every byte on the way;
+    returns what it says. Raises StanceError where a byte differs, or the log holds no such tick.
+    """
+    command = [str(find_program("stance-replay")), str(log), "--qp", str(out), "--qp-ticks", str(ticks)]
+    said = subprocess.run(command, capture_output=True, text=True, check=False)
+    if said.returncode != 0:
+        raise StanceError((said.stderr or said.stdout).strip().removeprefix("stance-replay: "))
+    return said.stdout.strip()
 
 
 def _mat(run: Run, out: Path) -> Path:

@@ -24,6 +24,9 @@ class BipedController {
   /// afresh.
   void step(const TickInput& input, StageClock& clock, TickOutput& out) noexcept;
 
+  /// The force QP of the last tick that stepped.
+  const force_qp::Problem& stepping_problem() const noexcept { return walk_.problem(); }
+
  private:
   static constexpr int kFeet = 2;
 

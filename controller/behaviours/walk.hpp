@@ -54,6 +54,8 @@ class Walk {
   void note(GaitTrace& trace) const noexcept;
 
   const planning::Gait& gait() const noexcept { return gait_; }
+  /// As `model` made it.
+  const force_qp::Problem& problem() const noexcept { return problem_; }
   const planning::VelocityReference& velocity() const noexcept { return velocity_; }
 
  private:
