@@ -39,7 +39,7 @@ PEERS = {
     "piqp": "PIQP 0.7, dense",
 }
 NAMES = {**OURS, **PEERS}
-COLOURS = (style.INK, style.MUTED, "#b02a8f", *style.JOINTS)
+COLOURS = (style.INK, style.MUTED, "#b02a8f", *style.JOINTS, style.PUSH)
 PANELS = ("stand", "walk")
 
 Case = tuple[str, int]
@@ -86,7 +86,10 @@ def read(files: Iterable[Path]) -> Results:
 
 
 def table(results: Results) -> str:
-    """Of the cases that there are: median / p99 [us] of each engine, and how much faster ours is than the best peer."""
+    """Of the cases that there are: median / p99 [us] of each engine, and how much faster ours is than the best peer.
+
+    A dash where an engine was not measured: left out, or given up by the benchmark for more than 1 s a tick.
+    """
     cases = [case for case in CASES if case in results.get("structured", {})]
     lines = [
         "| | " + " | ".join(f"{motion} {stages}" for motion, stages in cases) + " | largest error, N | failures |",
@@ -97,7 +100,7 @@ def table(results: Results) -> str:
         cells = [
             f"{_short(results[engine][case].median_us)} / {_short(results[engine][case].p99_us)}"
             if case in results[engine]
-            else "over 1 s"
+            else "–"  # noqa: RUF001
             for case in cases
         ]
         worst = max(result.max_force_error_N for result in held)
