@@ -11,7 +11,7 @@ struct Arm3TrackConfig {
   double limit_margin = 0.0;                   ///< rad, that the reference keeps from the joints' limits
   double kp = 0.0;                             ///< 1/s^2, closed by the drives
   double kd = 0.0;                             ///< 1/s
-  double lead = 0.0;                           ///< s, from a state to the mean of the instants at which the drives act on it
+  double lead = 0.0;  ///< s, from a state to the mean of the instants at which the drives act on it
 };
 
 struct Arm3Config {

@@ -10,10 +10,7 @@ namespace {
 constexpr int kJoints = 3;
 constexpr int kMostPeriods = 10;  // that one tick makes good, after a stall
 
-bool offers(const UserCommand& command) noexcept {
-  return command.behaviour == Behaviour::kStand || command.behaviour == Behaviour::kTrack ||
-         command.behaviour == Behaviour::kTrackSmooth;
-}
+constexpr safety::Offer kOffer{safety::behaviour_bits({Behaviour::kStand, Behaviour::kTrack, Behaviour::kTrackSmooth})};
 
 }  // namespace
 
@@ -22,7 +19,7 @@ Arm3Controller::Arm3Controller(const Arm3Config& config, const rigid_body::Model
       model_(model),
       tree_(rigid_body::screw_tree(model_)),
       ladder_(config.fault_ladder),
-      intake_(config.intake, model_, 0, offers),
+      intake_(config.intake, model_, 0, kOffer),
       integrator_(config.geometry) {
   config_.validate();
   start_run(0);

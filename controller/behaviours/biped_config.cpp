@@ -27,9 +27,8 @@ void BipedConfig::validate() const {
   force_qp.validate();
   height.validate();
   fault_ladder.validate();
-  validation.validate();
+  intake.validate();
   require(std::abs(last_link_pitch) < 1.5, "last_link_pitch", last_link_pitch, "within 1.5 rad of zero");
-  require(user_command_timeout >= kControlPeriod, "user_command_timeout", user_command_timeout, ">= 0.01 s");
   require(force_limits.friction > 0.0, "force_qp.friction", force_limits.friction, "> 0");
   require(force_limits.normal_force_min >= 0.0, "force_qp.normal_force_min", force_limits.normal_force_min, ">= 0 N");
   require(force_limits.normal_force_max > force_limits.normal_force_min, "force_qp.normal_force_max",

@@ -8,7 +8,7 @@
 #include "controller/planning/horizon.hpp"
 #include "controller/planning/velocity.hpp"
 #include "controller/safety/fault_ladder.hpp"
-#include "controller/safety/validation.hpp"
+#include "controller/safety/intake.hpp"
 
 namespace stance::behaviours {
 
@@ -62,8 +62,7 @@ struct TorqueMapConfig {
 };
 
 struct BipedConfig {
-  double last_link_pitch = 0.0;       ///< rad, of a leg's last link against the vertical
-  double user_command_timeout = 0.0;  ///< s without a user command after which it stops and stands
+  double last_link_pitch = 0.0;  ///< rad, of a leg's last link against the vertical
   estimation::BaseEstimatorConfig estimator;
   estimation::CentreOfMassOffsetConfig com_offset_observer;
   double com_offset_quiet_momentum = 0.0;  ///< kg m^2/s, about C, above which the observer waits
@@ -75,7 +74,7 @@ struct BipedConfig {
   SteppingConfig stepping;
   TorqueMapConfig torque_map;
   safety::FaultLadderConfig fault_ladder;
-  safety::ValidationConfig validation;
+  safety::IntakeConfig intake;
   kinematics::FallLimits fallen;
   JointVector damping = JointVector::Zero();  ///< N m s/rad, of the joints while damped
 

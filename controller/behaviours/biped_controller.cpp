@@ -54,6 +54,7 @@ BipedController::BipedController(const BipedConfig& config, const rigid_body::Mo
       legs_(kinematics::leg_geometries(model, feet)),
       fresh_estimator_(config.estimator, legs_, feet_[0].radius),
       fresh_observer_(config.com_offset_observer, model.total_mass, feet_[0].radius),
+      intake_(config.intake, model_, kFeet, offer()),
       ladder_(config.fault_ladder),
       estimator_(fresh_estimator_),
       observer_(fresh_observer_),
@@ -72,15 +73,22 @@ BipedController::BipedController(const BipedConfig& config, const rigid_body::Mo
 
 void BipedController::start_run(std::int64_t run_id) noexcept {
   memory_ = Memory{};
-  memory_.run_id = run_id;
+  intake_.start_run(run_id);
+  intake_.offer(offer());
   give_up(SafetyMode::kDamp, memory_.last);
   ladder_ = safety::FaultLadder(config_.fault_ladder);
   estimator_ = fresh_estimator_;
   observer_ = fresh_observer_;
 }
 
+safety::Offer BipedController::offer() const noexcept {
+  return {safety::behaviour_bits({Behaviour::kStand, Behaviour::kWalk, Behaviour::kLieDown}),
+          config_.height.offset_range};
+}
+
 void BipedController::step(const TickInput& input, StageClock& clock, TickOutput& out) noexcept {
-  const bool fresh = accept(input);
+  if (intake_.starts_run(input.state)) start_run(input.state.run_id);
+  const bool fresh = intake_.accept(input, ladder_);
   clock.stamp(Stage::kValidate);
 
   out = memory_.last;
@@ -119,62 +127,6 @@ void BipedController::step(const TickInput& input, StageClock& clock, TickOutput
   trace.fault_count = ladder_.counts();
   memory_.last = out;
   clock.stamp(Stage::kSafety);
-}
-
-bool BipedController::accept(const TickInput& input) noexcept {
-  const RobotState& state = input.state;
-  if (starts_run(memory_.run_id, memory_.state_seq, state)) start_run(state.run_id);
-  if (input.operator_stop) ladder_.report(Fault::kOperatorStop);
-
-  take_command(input);
-  if (!input.state_is_new) {
-    ladder_.report(Fault::kStateStale);
-    return false;
-  }
-  if (!follows(state) || !safety::state_is_plausible(config_.validation, model_, kFeet, state)) {
-    ladder_.report(Fault::kStateInvalid);
-    return false;
-  }
-  memory_.state_seq = state.seq;
-  memory_.state_utime = state.utime;
-  return true;
-}
-
-void BipedController::take_command(const TickInput& input) noexcept {
-  const UserCommand& command = input.user_command;
-  UserCommand& taken = memory_.user_command;
-  memory_.user_command_age += input.periods;
-  if (command.seq != taken.seq) {
-    // A robot that lies cannot get up.
-    const bool offered =
-        (memory_.lying ? command.behaviour == Behaviour::kLieDown : command.behaviour <= Behaviour::kLieDown) &&
-        command.height_offset >= config_.height.offset_range[0] &&
-        command.height_offset <= config_.height.offset_range[1];
-    if (safety::command_is_plausible(command) && offered) {
-      taken = command;
-      memory_.user_command_age = 0;
-    } else {
-      taken.seq = command.seq;
-      ladder_.report(Fault::kCommandInvalid);
-    }
-  }
-  // An operator who is heard no more no longer wants to walk. A robot on its way down goes on.
-  const double age = kControlPeriod * static_cast<double>(memory_.user_command_age);
-  if (taken.behaviour == Behaviour::kWalk && age > config_.user_command_timeout) taken.behaviour = Behaviour::kStand;
-  if (taken.behaviour != Behaviour::kWalk) {
-    taken.velocity.setZero();
-    taken.yaw_rate = 0.0;
-  }
-}
-
-bool BipedController::follows(const RobotState& state) const noexcept {
-  if (state.seq <= memory_.state_seq || state.utime <= memory_.state_utime) return false;
-  if (memory_.state_seq == 0) return true;
-  // A number or a stamp far off would make every later state one out of order.
-  constexpr double period_us = kControlPeriod * 1e6;
-  const double periods = static_cast<double>(state.seq) - static_cast<double>(memory_.state_seq);
-  const double elapsed_us = static_cast<double>(state.utime) - static_cast<double>(memory_.state_utime);
-  return std::abs(elapsed_us - periods * period_us) < 0.5 * period_us;
 }
 
 void BipedController::estimate(int periods, const RobotState& state, BaseEstimate& base) noexcept {
@@ -216,9 +168,9 @@ void BipedController::plan(int periods, const RobotState& state, Trace& trace) n
   now.v_WC = body_.centroidal.v_WC;
   now.w_WB_W = base.w_WB_W;
   now.contact_switch = {state.now().contact_switch[0], state.now().contact_switch[1]};
-  now.velocity = memory_.user_command.velocity;
-  now.yaw_rate = memory_.user_command.yaw_rate;
-  now.height_offset = memory_.user_command.height_offset;
+  now.velocity = intake_.user_command().velocity;
+  now.yaw_rate = intake_.user_command().yaw_rate;
+  now.height_offset = intake_.user_command().height_offset;
   now.periods = periods;
 
   estimation::CentreOfMassOffsetInput seen;
@@ -261,7 +213,10 @@ void BipedController::stand(const WalkInput& now, TickState& reference) noexcept
   where.height_offset = lying_down() ? lowest : now.height_offset;
   where.periods = now.periods;
   stand_.plan(where, reference);
-  memory_.lying = memory_.lying || (lying_down() && stand_.height_offset() <= lowest);
+  if (!lying_down() || stand_.height_offset() > lowest) return;
+  memory_.lying = true;
+  // It cannot get up.
+  intake_.offer({safety::behaviour_bits({Behaviour::kLieDown}), config_.height.offset_range});
 }
 
 void BipedController::choose_behaviour(const WalkInput& now) noexcept {
@@ -270,7 +225,7 @@ void BipedController::choose_behaviour(const WalkInput& now) noexcept {
   // The divergent component of motion from the middle of the feet, and the feet from each other.
   const Vector2 xi = in_heading(now.p_WC + now.v_WC / walk_.gait().omega() - 0.5 * (now.p_WF[0] + now.p_WF[1]));
   const double pitch_soon = now.rpy.y() + c.capture_lead * in_heading(now.w_WB_W).y();
-  const bool wanted = memory_.user_command.behaviour == Behaviour::kWalk;
+  const bool wanted = intake_.user_command().behaviour == Behaviour::kWalk;
   if (memory_.lying) return;
   if (!memory_.stepping) {
     const bool pushed =

@@ -9,6 +9,7 @@
 #include "controller/estimation/base_estimator.hpp"
 #include "controller/estimation/com_offset_observer.hpp"
 #include "controller/safety/fault_ladder.hpp"
+#include "controller/safety/intake.hpp"
 
 namespace stance::behaviours {
 
@@ -32,34 +33,28 @@ class BipedController {
 
   /// What a run has made of the controller so far: a new run starts with a new one.
   struct Memory {
-    std::int64_t run_id = 0;
-    std::int64_t state_seq = 0;         ///< last state acted on
-    std::int64_t state_utime = -1;      ///< us
-    UserCommand user_command;           ///< last plausible one, or what is left of it when it is old
-    std::int64_t user_command_age = 0;  ///< control periods since it came, by the ticks
-    double yaw = 0.0;                   ///< rad, unwrapped
-    std::int64_t plan_age = 0;          ///< control periods since the plan was made or shifted
-    bool standing = false;              ///< the stance has been taken up
+    double yaw = 0.0;           ///< rad, unwrapped
+    std::int64_t plan_age = 0;  ///< control periods since the plan was made or shifted
+    bool standing = false;      ///< the stance has been taken up
     bool stepping = false;
     bool lying = false;  ///< let down: nothing but a new run ends it
     TickOutput last;     ///< what HOLD repeats
   };
 
   void start_run(std::int64_t run_id) noexcept;
-  bool accept(const TickInput& input) noexcept;
-  void take_command(const TickInput& input) noexcept;
+  /// To a robot that does not lie.
+  safety::Offer offer() const noexcept;
   void estimate(int periods, const RobotState& state, BaseEstimate& base) noexcept;
   void plan(int periods, const RobotState& state, Trace& trace) noexcept;
   void stand(const WalkInput& now, TickState& reference) noexcept;
   /// From standing to stepping and back, and from standing to lying.
   void choose_behaviour(const WalkInput& now) noexcept;
-  bool lying_down() const noexcept { return memory_.user_command.behaviour == Behaviour::kLieDown; }
+  bool lying_down() const noexcept { return intake_.user_command().behaviour == Behaviour::kLieDown; }
   std::array<LegTask, kFeet> leg_tasks(const ForcePlan& plan) const noexcept;
   /// The plan of this tick: solved, else the last one shifted to now.
   void make_plan(const TickInput& input, TickOutput& out) noexcept;
   ContactFlags standing_feet() const noexcept;
   estimation::ContactPlan contact_plan() const noexcept;
-  bool follows(const RobotState& state) const noexcept;
   /// No forces: what the robot is commanded in DAMP and STOP.
   void give_up(SafetyMode mode, TickOutput& out) const noexcept;
 
@@ -71,6 +66,7 @@ class BipedController {
   estimation::CentreOfMassOffsetObserver fresh_observer_;
 
   Memory memory_;
+  safety::Intake intake_;
   safety::FaultLadder ladder_;
   estimation::BaseEstimator estimator_;
   estimation::CentreOfMassOffsetObserver observer_;

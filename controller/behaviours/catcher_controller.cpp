@@ -17,9 +17,7 @@ using planning::InterceptionStatus;
 
 constexpr int kMostPeriods = 10;  // that one tick makes good, after a stall
 
-bool offers(const UserCommand& command) noexcept {
-  return command.behaviour == Behaviour::kStand || command.behaviour == Behaviour::kCatch;
-}
+constexpr safety::Offer kOffer{safety::behaviour_bits({Behaviour::kStand, Behaviour::kCatch})};
 
 static_assert(kMaxCalibrationPoints == calibration::kMaxPoints);
 
@@ -66,7 +64,7 @@ CatcherController::CatcherController(const CatcherConfig& config, const rigid_bo
       cup_(rigid_body::tip_on_link(model, model.num_joints, {Matrix3::Identity(), {0.0, 0.0, config.tool}})),
       arm_(kinematics::arm5_geometry(model, config.tool)),
       ladder_(config.fault_ladder),
-      intake_(config.intake, model_, 0, offers),
+      intake_(config.intake, model_, 0, kOffer),
       track_(config.track, config.filter),
       interception_(config.planner, arm_, kinematics::arm5_limits(model), config.motion) {
   config_.validate();

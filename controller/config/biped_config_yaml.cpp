@@ -224,7 +224,7 @@ behaviours::BipedConfig biped_config(const RobotDescription& robot) {
   StrictYaml yaml = root.mapping("controller");
   behaviours::BipedConfig c;
   c.last_link_pitch = yaml.number("last_link_pitch");
-  c.user_command_timeout = yaml.number("user_command_timeout");
+  c.intake.user_command_timeout = yaml.number("user_command_timeout");
   c.estimator = estimator(yaml.mapping("estimator"));
   c.com_offset_observer = com_offset_observer(yaml.mapping("com_offset_observer"), c.com_offset_quiet_momentum);
   force_qp(yaml.mapping("force_qp"), c.force_qp, c.force_limits);
@@ -233,7 +233,7 @@ behaviours::BipedConfig biped_config(const RobotDescription& robot) {
   c.walk = walk(yaml.mapping("walk"));
   c.stepping = stepping(yaml.mapping("stepping"));
   c.torque_map = torque_map(yaml.mapping("torque_map"));
-  read_safety(yaml.mapping("safety"), c.fault_ladder, c.validation);
+  read_safety(yaml.mapping("safety"), c.fault_ladder, c.intake.validation);
   yaml.finish();
   c.damping = robot.drives.damping;
   c.fallen = robot.fallen;

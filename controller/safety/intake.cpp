@@ -11,8 +11,14 @@ void IntakeConfig::validate() const {
   Require{""}(user_command_timeout >= kControlPeriod, "user_command_timeout", user_command_timeout, ">= 0.01 s");
 }
 
-Intake::Intake(const IntakeConfig& config, const rigid_body::Model& model, int num_contacts, Offers offers)
-    : config_(config), model_(model), num_contacts_(num_contacts), offers_(offers) {
+bool Offer::includes(const UserCommand& command) const noexcept {
+  const int behaviour = static_cast<int>(command.behaviour);
+  return behaviour >= 0 && behaviour < 32 && (behaviours >> behaviour & 1U) != 0 &&
+         command.height_offset >= height_offset[0] && command.height_offset <= height_offset[1];
+}
+
+Intake::Intake(const IntakeConfig& config, const rigid_body::Model& model, int num_contacts, const Offer& offer)
+    : config_(config), model_(model), num_contacts_(num_contacts), offer_(offer) {
   config_.validate();
 }
 
@@ -45,7 +51,7 @@ void Intake::take_command(const TickInput& input, FaultLadder& ladder) noexcept 
   const UserCommand& command = input.user_command;
   command_age_ += input.periods;
   if (command.seq != command_.seq) {
-    if (command_is_plausible(command) && offers_(command)) {
+    if (command_is_plausible(command) && offer_.includes(command)) {
       command_ = command;
       command_age_ = 0;
     } else {
@@ -53,9 +59,10 @@ void Intake::take_command(const TickInput& input, FaultLadder& ladder) noexcept 
       ladder.report(Fault::kCommandInvalid);
     }
   }
-  // An operator who is heard no more wants nothing: not what was wanted last.
-  if (kControlPeriod * static_cast<double>(command_age_) > config_.user_command_timeout) {
-    command_.behaviour = Behaviour::kStand;
+  // An operator who is heard no more wants nothing: not what was wanted last. A robot on its way down goes on.
+  const bool silent = kControlPeriod * static_cast<double>(command_age_) > config_.user_command_timeout;
+  if (silent && command_.behaviour != Behaviour::kLieDown) command_.behaviour = Behaviour::kStand;
+  if (command_.behaviour != Behaviour::kWalk) {
     command_.velocity.setZero();
     command_.yaw_rate = 0.0;
   }

@@ -68,12 +68,12 @@ TEST_CASE("TheBipedsOwnConfigurationIsRead") {
   const behaviours::BipedConfig c = biped_config(biped());
   const YAML::Node yaml = YAML::Load(biped().yaml_text)["controller"];
   CHECK(c.last_link_pitch == yaml["last_link_pitch"].as<double>());
-  CHECK(c.user_command_timeout == yaml["user_command_timeout"].as<double>());
+  CHECK(c.intake.user_command_timeout == yaml["user_command_timeout"].as<double>());
   CHECK(c.estimator.initial_accelerometer_bias_sigma ==
         yaml["estimator"]["initial_accelerometer_bias_sigma"].as<double>());
   CHECK(c.com_offset_observer.bandwidth == yaml["com_offset_observer"]["bandwidth"].as<double>());
   CHECK(c.com_offset_quiet_momentum == yaml["com_offset_observer"]["quiet_momentum"].as<double>());
-  CHECK(c.force_qp.engine == QpEngine::kOsqpSparse);
+  CHECK(c.force_qp.engine == QpEngine::kStructured);
   CHECK(c.force_qp.max_iterations == yaml["force_qp"]["max_iterations"].as<int>());
   CHECK(c.force_limits.normal_force_max == yaml["force_qp"]["normal_force_max"].as<double>());
   CHECK(c.stand.stages == yaml["stand"]["stages"].as<int>());
@@ -86,7 +86,7 @@ TEST_CASE("TheBipedsOwnConfigurationIsRead") {
   const YAML::Node fallen = YAML::Load(biped().yaml_text)["fallen"];
   CHECK(c.fallen.min_upright == fallen["min_upright"].as<double>());
   CHECK(c.fallen.min_height == fallen["min_height"].as<double>());
-  CHECK(c.validation.joint_velocity_factor == yaml["safety"]["joint_velocity_factor"].as<double>());
+  CHECK(c.intake.validation.joint_velocity_factor == yaml["safety"]["joint_velocity_factor"].as<double>());
 }
 
 TEST_CASE("AnyKeyOfTheControllersSectionThatIsMissingIsNamed") {

@@ -94,6 +94,12 @@ user_command_t stand_command(std::int64_t seq, double height_offset) {
   return command;
 }
 
+/// With one iteration of OSQP, which is enough where no force reaches its limits, and nowhere else.
+config::RobotDescription starved_of_iterations() {
+  const config::RobotDescription robot = biped_with("controller.force_qp.max_iterations", "1");
+  return config::robot_from_texts(with_engine(robot.yaml_text, "osqp-sparse"), robot.urdf_text);
+}
+
 }  // namespace
 
 TEST_CASE("OnPerfectSensorsItStandsUprightWithoutAFault") {
@@ -404,10 +410,10 @@ TEST_CASE("AHeightThatTheOperatorWantsIsTakenToTheEndsOfItsRange") {
 }
 
 TEST_CASE("WhereTheQpFailsTheLastPlanIsHeldThenItDampsThenStops") {
-  // One iteration of OSQP is never enough: the QP fails as soon as a force reaches its limits, which a push sees to.
+  // The QP fails as soon as a force reaches its limits, which a push sees to.
   sim::Scenario scenario = quiet_stand();
   scenario.pushes = {{.time = 0.2, .duration = 10.0, .force_W = {0.0, 60.0, 0.0}, .point_B = Vector3::Zero()}};
-  BipedRig rig(scenario, biped_with("controller.force_qp.max_iterations", "1"));
+  BipedRig rig(scenario, starved_of_iterations());
   ForcePlan last;
   JointCommand command;
   int ticks = 0;
@@ -431,7 +437,7 @@ TEST_CASE("WhereTheQpFailsTheLastPlanIsHeldThenItDampsThenStops") {
 }
 
 TEST_CASE("WhereTheFirstQpOfARunFailsThereIsNothingToHoldAndItDampsUntilOneSolves") {
-  BipedRig rig(quiet_stand(), biped_with("controller.force_qp.max_iterations", "1"));
+  BipedRig rig(quiet_stand(), starved_of_iterations());
   // It seems to turn over: what balances that is beyond the forces' limits.
   robot_state_t state = rig.state();
   state.gyro[1][0] = 5.0;
@@ -447,7 +453,7 @@ TEST_CASE("WhereTheFirstQpOfARunFailsThereIsNothingToHoldAndItDampsUntilOneSolve
 }
 
 TEST_CASE("AQpThatSolvesAgainWithinTheHoldTimeIsTakenUpAgainAndItStands") {
-  BipedRig rig(quiet_stand(), biped_with("controller.force_qp.max_iterations", "1"));
+  BipedRig rig(quiet_stand(), starved_of_iterations());
   rig.tick_times(kSettled);
   const ForcePlan last = rig.ticker.output().plan;
   // For one state it seems to turn over: what balances that is beyond the forces' limits.

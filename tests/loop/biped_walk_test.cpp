@@ -202,7 +202,7 @@ TEST_CASE("WhereTheQpFailsWhileItWalksThePlanGoesOnUntilTheLadderEndsIt") {
 }
 
 TEST_CASE("WhereUserCommandsCeaseItStopsAndStands") {
-  const double timeout = config::biped_config(test::biped()).user_command_timeout;
+  const double timeout = config::biped_config(test::biped()).intake.user_command_timeout;
   const int ticks = static_cast<int>(std::lround(timeout / kControlPeriod));
   BipedRig rig;
   rig.tick_times(kSettled);

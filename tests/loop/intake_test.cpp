@@ -10,11 +10,11 @@ namespace {
 
 constexpr IntakeConfig kConfig{{1.0, 50.0, 0.1, 2.0}, 0.05};
 
-bool all(const UserCommand& /*command*/) noexcept { return true; }
-bool standing(const UserCommand& command) noexcept { return command.behaviour == Behaviour::kStand; }
+constexpr Offer kAll{behaviour_bits({Behaviour::kStand, Behaviour::kWalk, Behaviour::kLieDown, Behaviour::kTrack})};
+constexpr Offer kStanding{behaviour_bits({Behaviour::kStand}), {-0.2, 0.1}};
 
 struct Bench {
-  explicit Bench(Intake::Offers offers = all) : intake(kConfig, model, 0, offers) { intake.start_run(7); }
+  explicit Bench(const Offer& offer = kAll) : intake(kConfig, model, 0, offer) { intake.start_run(7); }
 
   /// One tick, a period after the last.
   bool tick(std::int64_t seq, bool is_new = true) {
@@ -70,22 +70,35 @@ TEST_CASE("AStateThatIsNotThisRobotsIsRefused") {
 TEST_CASE("AWishLastsUntilItsTimeoutAndThenNothingIsWanted") {
   Bench bench;
   bench.input.user_command.seq = 1;
-  bench.input.user_command.behaviour = Behaviour::kTrack;
+  bench.input.user_command.behaviour = Behaviour::kWalk;
   bench.input.user_command.velocity = {0.2, 0.1};
   for (int k = 1; k <= 6; ++k) {  // 0.05 s after it came
     bench.tick(k);
-    CHECK(bench.intake.user_command().behaviour == Behaviour::kTrack);
+    CHECK(bench.intake.user_command().behaviour == Behaviour::kWalk);
+    CHECK(bench.intake.user_command().velocity.x() == 0.2);
   }
   bench.tick(7);
   CHECK(bench.intake.user_command().behaviour == Behaviour::kStand);
   CHECK(bench.intake.user_command().velocity.isZero());
   bench.input.user_command.seq = 2;
   bench.tick(8);
-  CHECK(bench.intake.user_command().behaviour == Behaviour::kTrack);
+  CHECK(bench.intake.user_command().behaviour == Behaviour::kWalk);
+}
+
+TEST_CASE("TheWishToLieDownOutlastsItsOperatorAndHasNoVelocity") {
+  Bench bench;
+  bench.input.user_command.seq = 1;
+  bench.input.user_command.behaviour = Behaviour::kLieDown;
+  bench.input.user_command.velocity = {0.2, 0.1};
+  for (int k = 1; k <= 20; ++k) {
+    bench.tick(k);
+    CHECK(bench.intake.user_command().behaviour == Behaviour::kLieDown);
+    CHECK(bench.intake.user_command().velocity.isZero());
+  }
 }
 
 TEST_CASE("AWishThatIsNotOfferedIsToldOnceAndTheLastOneStays") {
-  Bench bench(standing);
+  Bench bench(kStanding);
   bench.input.user_command.seq = 1;
   bench.input.user_command.height_offset = 0.1;
   bench.tick(1);
@@ -96,6 +109,17 @@ TEST_CASE("AWishThatIsNotOfferedIsToldOnceAndTheLastOneStays") {
   CHECK(bench.intake.user_command().height_offset == 0.1);
   bench.tick(3);
   CHECK_FALSE(bench.told(Fault::kCommandInvalid));
+  bench.input.user_command.seq = 3;
+  bench.input.user_command.behaviour = Behaviour::kStand;
+  bench.input.user_command.height_offset = 0.11;
+  bench.tick(4);
+  CHECK(bench.told(Fault::kCommandInvalid));
+  bench.intake.offer({behaviour_bits({Behaviour::kWalk}), {0.11, 0.11}});
+  bench.input.user_command.seq = 4;
+  bench.input.user_command.behaviour = Behaviour::kWalk;
+  bench.tick(5);
+  CHECK(bench.ladder.faults() == 0);
+  CHECK(bench.intake.user_command().behaviour == Behaviour::kWalk);
 }
 
 TEST_CASE("ANewRunIsSeenAndForgetsWhatWasTaken") {
