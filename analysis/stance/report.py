@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
@@ -236,7 +236,7 @@ def _motion(metrics: Metrics) -> list[list[str]]:
         rows.append(("estimated velocity, error rms", metrics.estimator.velocity_rms, "m/s"))
         rows.append(("estimated tilt, largest error", metrics.estimator.tilt_max_deg, "deg"))
     rows.append(("drives damped", metrics.drives_damped, "s"))
-    return [[name, quantity(value, unit)] for name, value, unit in rows if value is not None]
+    return _told(rows)
 
 
 def _walking(found: Walking) -> list[list[str]]:
@@ -272,6 +272,11 @@ def _walking(found: Walking) -> list[list[str]]:
     return [[name, value] for name, value in rows if value is not None]
 
 
+def _told(rows: Sequence[tuple[str, float | None, str]]) -> list[list[str]]:
+    """Name, figure and unit for people; figures that there are not are left out."""
+    return [[name, quantity(value, unit)] for name, value, unit in rows if value is not None]
+
+
 def _arm_motion(of: Motion) -> list[list[str]]:
     rows: list[tuple[str, float | None, str]] = [
         ("begins at", of.start, "s"),
@@ -284,7 +289,7 @@ def _arm_motion(of: Motion) -> list[list[str]]:
         ("map less forward kinematics after the last step", of.map_error_final, "m"),
         ("orthonormality of the map, largest defect", of.orthonormality_max, ""),
     ]
-    return [[name, quantity(value, unit)] for name, value, unit in rows if value is not None]
+    return _told(rows)
 
 
 def _catching(of: Catching) -> list[list[str]]:
@@ -296,7 +301,7 @@ def _catching(of: Catching) -> list[list[str]]:
         ("joint from its reference, largest", of.joint_error_max, "rad"),
         ("cup from its reference, largest", of.cup_error_max, "m"),
     ]
-    return [[name, quantity(value, unit)] for name, value, unit in rows if value is not None]
+    return _told(rows)
 
 
 def _crossing(one: Throw) -> str:

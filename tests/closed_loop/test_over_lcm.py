@@ -6,6 +6,7 @@ import json
 import os
 import subprocess
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -16,6 +17,7 @@ from stance.catcher import PHASES
 from stance.log import Log
 from stance.programs import find_program
 from stance.replay import verify
+from stance.series import Run
 from stance_msgs import (
     arm3_motion_t,
     ball_estimate_t,
@@ -138,19 +140,26 @@ def test_a_walk_in_lockstep_over_lcm_equals_the_rollout_byte_for_byte(tmp_path: 
     assert run.field("TRUTH", "p_WB")[-1, 0] > 2.5  # m, forward
 
 
-def test_an_arm_in_lockstep_over_lcm_equals_the_rollout_byte_for_byte_and_replays(tmp_path: Path) -> None:
-    result, log = play_whole("arm", tmp_path, (*ARMS_DECISIONS, *PLANT))
+def lockstep_of_the_rollout(
+    scene: str, robot: str, decisions: Sequence[str], plant: Sequence[str], tmp_path: Path
+) -> tuple[Run, str]:
+    """A robot's demo in lockstep over LCM, equal to its rollout byte for byte; and what its replay told."""
+    result, log = play_whole(scene, tmp_path, (*decisions, *plant))
     assert result["fell"] is False
-    rolled = roll_out("demo", tmp_path, "arm3")
-    assert_same_decisions(log, rolled, ARMS_DECISIONS)
-    for channel in PLANT:
+    rolled = roll_out("demo", tmp_path, robot)
+    assert_same_decisions(log, rolled, decisions)
+    for channel in plant:
         assert payloads(log, channel, 1000) == payloads(rolled, channel, 1000), channel
-    run = Log.open(log).run()
-    assert "FORCE_PLAN" not in run
-    assert run.field("ARM3_MOTION", "step").max() == 800
     verified = verify(log, capture=True)
     assert verified.returncode == 0, verified.stdout
-    assert "900 of 900 ticks replayed, 2700 messages compared, 0 differ" in verified.stdout
+    return Log.open(log).run(), verified.stdout
+
+
+def test_an_arm_in_lockstep_over_lcm_equals_the_rollout_byte_for_byte_and_replays(tmp_path: Path) -> None:
+    run, told = lockstep_of_the_rollout("arm", "arm3", ARMS_DECISIONS, PLANT, tmp_path)
+    assert "FORCE_PLAN" not in run
+    assert run.field("ARM3_MOTION", "step").max() == 800
+    assert "900 of 900 ticks replayed, 2700 messages compared, 0 differ" in told
 
 
 def test_an_arm_in_real_time_plays_its_motion_and_replays(tmp_path: Path) -> None:
@@ -164,17 +173,9 @@ def test_an_arm_in_real_time_plays_its_motion_and_replays(tmp_path: Path) -> Non
 
 
 def test_a_catch_in_lockstep_over_lcm_equals_the_rollout_byte_for_byte_and_replays(tmp_path: Path) -> None:
-    result, log = play_whole("catcher", tmp_path, (*CATCHERS_DECISIONS, *CATCHERS_PLANT))
-    assert result["fell"] is False
-    rolled = roll_out("demo", tmp_path, "catcher")
-    assert_same_decisions(log, rolled, CATCHERS_DECISIONS)
-    for channel in CATCHERS_PLANT:
-        assert payloads(log, channel, 1000) == payloads(rolled, channel, 1000), channel
-    run = Log.open(log).run()
+    run, told = lockstep_of_the_rollout("catcher", "catcher", CATCHERS_DECISIONS, CATCHERS_PLANT, tmp_path)
     assert {"catching", "holding", "returning"} <= {PHASES[int(phase)] for phase in run.field("CATCH_PLAN", "phase")}
-    verified = verify(log, capture=True)
-    assert verified.returncode == 0, verified.stdout
-    assert "900 of 900 ticks replayed, 3600 messages compared, 0 differ" in verified.stdout
+    assert "900 of 900 ticks replayed, 3600 messages compared, 0 differ" in told
 
 
 def test_a_catcher_in_real_time_replays(tmp_path: Path) -> None:
