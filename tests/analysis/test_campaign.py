@@ -78,11 +78,15 @@ class Bench:
 
     def done(self) -> list[str]:
         """The lines of trials.jsonl."""
-        return [line for path in self.output.rglob("trials.jsonl") for line in path.read_text().splitlines()]
+        return [line for path in self.tables() for line in path.read_text().splitlines()]
+
+    def tables(self) -> list[Path]:
+        """Each study's trials.jsonl. Not by rglob: it would enter a trial's own directory, which a campaign removes."""
+        return list(self.output.glob("*/*/trials.jsonl"))
 
     def wait(self, process: subprocess.Popen[Any], count: int) -> None:
         """Until a campaign of its own process has begun, and done so many trials."""
-        while not list(self.output.rglob("trials.jsonl")) or len(self.done()) < count:
+        while not self.tables() or len(self.done()) < count:
             assert process.poll() is None
             time.sleep(0.05)
 
@@ -212,9 +216,9 @@ def test_a_campaign_that_is_killed_goes_on_where_it_was(bench: Bench) -> None:
     bench.wait(process, 6)
     process.kill()
     process.wait()
-    with next(bench.output.rglob("trials.jsonl")).open("a") as file:
+    with bench.tables()[0].open("a") as file:
         file.write('{"key": "torn')
-    (next(bench.output.rglob("trials.jsonl")).parent / "logs/half.lcmlog").write_bytes(b"of a trial that was running")
+    (bench.tables()[0].parent / "logs/half.lcmlog").write_bytes(b"of a trial that was running")
     before = bench.calls()
     assert {seed for _, seed, _ in before} == {1, 2}
     outcome = bench.run(trials=4)
