@@ -12,9 +12,10 @@ estimation::BaseEstimatorConfig estimator(StrictYaml yaml) {
   c.accelerometer_noise = yaml.number("accelerometer_noise");
   c.position_noise = yaml.number("position_noise");
   c.gyro_bias_noise = yaml.number("gyro_bias_noise");
-  c.position_memory = yaml.number("position_memory");
   c.accelerometer_bias_noise = yaml.number("accelerometer_bias_noise");
   c.stance_foot_noise = yaml.number("stance_foot_noise");
+  c.standing_foot_noise = yaml.number("standing_foot_noise");
+  c.standing_time = yaml.number("standing_time");
   c.unloading_foot_noise = yaml.number("unloading_foot_noise");
   c.swing_foot_noise = yaml.number("swing_foot_noise");
   c.foot_velocity_sigma = yaml.number("foot_velocity_sigma");

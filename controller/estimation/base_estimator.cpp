@@ -6,13 +6,18 @@
 //   2. gate     before any update: a foot in contact slips where its velocity's NIS > slip_gate (or is no number);
 //               its time in contact starts again
 //   3. feet     not in contact or slipping: d = R c anew, its error uncorrelated, of variance swing_foot_noise^2 dt;
-//               others: variance plus (stance_foot_noise + unloading_foot_noise (1 - alpha))^2 dt
+//               others: variance plus (stance_foot_noise + unloading_foot_noise (1 - alpha))^2 dt; where the robot
+//               stands, which is with both feet on for standing_time, standing_foot_noise^2 dt
 //   4. update   each foot in contact: velocity, position; variances times 1 + ramp_gain (1 - alpha). A slipping foot's
 //               velocity is skipped, but once refused for slip_timeout it is taken, its variance times slip_inflation.
 //
-// The position's correlations fade with position_memory. Each new look at the gyro's bias also turns the way walked so
-// far about its start: far from there the position, and with it every foothold in W, would jump by more than a foot
-// may.
+// Of the heading feet tell only where the robot stands. In the double supports of a gait an encoder's offset and a foot
+// that gives by a millimetre turn the line between the feet by milliradians, always the same way, so that the gyro's
+// bias would be taken for another: there the heading is the gyro's, its bias as it was found while standing.
+//
+// The position is the velocity's integral: no measurement moves it. Each new look at the heading would turn the way
+// walked so far about its start: far from there the position, and with it every foothold in W, would jump by more than
+// a foot may.
 //
 // Gating the velocity alone would not do: a slipping foot's position drags velocity and tilt too, hence step 3 for it.
 //
@@ -62,9 +67,10 @@ void BaseEstimatorConfig::validate() const {
       {"accelerometer_noise", accelerometer_noise, kTiny, 10.0},
       {"position_noise", position_noise, 0.0, 1.0},
       {"gyro_bias_noise", gyro_bias_noise, 0.0, 1.0},
-      {"position_memory", position_memory, 0.01, 1e9},
       {"accelerometer_bias_noise", accelerometer_bias_noise, 0.0, 1.0},
       {"stance_foot_noise", stance_foot_noise, 0.0, 1.0},
+      {"standing_foot_noise", standing_foot_noise, 0.0, 1.0},
+      {"standing_time", standing_time, 0.0, 10.0},
       {"unloading_foot_noise", unloading_foot_noise, 0.0, 10.0},
       {"swing_foot_noise", swing_foot_noise, 0.1, 1000.0},
       {"foot_velocity_sigma", foot_velocity_sigma, 1e-5, 10.0},
@@ -184,7 +190,6 @@ void BaseEstimator::advance(const ImuMean& imu) noexcept {
   q.segment<3>(kGyroBias).setConstant(squared(c.gyro_bias_noise) * imu.dt);
   q.segment<3>(kAccelerometerBias).setConstant(squared(c.accelerometer_bias_noise) * imu.dt);
   filter_.predict_covariance([&transition](ErrorMatrix& M) { transition.multiply(M); }, q);
-  fade_correlations(kPosition, std::exp(-imu.dt / c.position_memory));
 }
 
 void BaseEstimator::step_sample(const ImuMean& imu, const SensorSample& sample, const ContactPlan& plan) noexcept {
@@ -217,7 +222,8 @@ void BaseEstimator::step_sample(const ImuMean& imu, const SensorSample& sample, 
         in_contact_[i] ? std::clamp(std::min(contact_time_[i] / c.contact_ramp, plan.load[i]), 0.0, 1.0) : 0.0;
     variance_scale[i] = 1.0 + c.ramp_gain * (1.0 - trust);
     if (in_contact_[i] && !slipping_[i]) {
-      const double noise = c.stance_foot_noise + c.unloading_foot_noise * (1.0 - trust);
+      const double noise =
+          stands() ? c.standing_foot_noise : c.stance_foot_noise + c.unloading_foot_noise * (1.0 - trust);
       filter_.P.diagonal().segment<3>(foot_index(i)).array() += squared(noise) * dt;
     } else {
       state_.p_BF_W[i] = state_.R_WB * feet[i].p_BF;
@@ -260,21 +266,22 @@ bool BaseEstimator::given_up(int foot) const noexcept {
   return slipping_[foot] && rejected_time_[foot] >= config_.slip_timeout;
 }
 
+bool BaseEstimator::stands() const noexcept {
+  return contact_time_[0] >= config_.standing_time && contact_time_[1] >= config_.standing_time;
+}
+
 void BaseEstimator::forget(int begin, double variance) noexcept {
   filter_.P.middleRows<3>(begin).setZero();
   filter_.P.middleCols<3>(begin).setZero();
   filter_.P.diagonal().segment<3>(begin).setConstant(variance);
 }
 
-void BaseEstimator::fade_correlations(int begin, double keep) noexcept {
-  const Matrix3 own = filter_.P.block<3, 3>(begin, begin);
-  filter_.P.middleRows<3>(begin) *= keep;
-  filter_.P.middleCols<3>(begin) *= keep;
-  filter_.P.block<3, 3>(begin, begin) = own;
-}
-
 void BaseEstimator::update(const ErrorMeasurement& measurement, double variance) noexcept {
-  const auto innovation = filter_.update(measurement.z, measurement.H, variance * Matrix3::Identity());
+  const Matrix3 R = variance * Matrix3::Identity();
+  const auto innovation = stands()
+                              ? filter_.update(measurement.z, measurement.H, R, kPosition, kPosition + 1, kPosition + 2)
+                              : filter_.update(measurement.z, measurement.H, R, kPosition, kPosition + 1, kPosition + 2,
+                                               kTheta + 2, kGyroBias + 2);
   state_ = plus(state_, filter_.x);
   filter_.x.setZero();
   nis_sum_ += innovation.nis;

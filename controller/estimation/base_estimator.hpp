@@ -19,11 +19,12 @@ struct BaseEstimatorConfig {
   double gyro_bias_noise = 0.0;           ///< rad/s/sqrt(s)
   double accelerometer_bias_noise = 0.0;  ///< m/s^2/sqrt(s)
   double stance_foot_noise = 0.0;         ///< m/sqrt(s)
+  double standing_foot_noise = 0.0;       ///< m/sqrt(s), of feet that stand
+  double standing_time = 0.0;             ///< s, with both feet on, from which on they stand
   double unloading_foot_noise = 0.0;      ///< m/sqrt(s), added as a foot loads or unloads
   double swing_foot_noise = 0.0;          ///< m/sqrt(s)
   double foot_velocity_sigma = 0.0;       ///< m/s
   double foot_position_sigma = 0.0;       ///< m
-  double position_memory = 0.0;           ///< s, for which what is learnt later still moves the position
   double contact_ramp = 0.0;              ///< s, from touchdown to full trust
   double ramp_gain = 0.0;                 ///< measurement variances grow by 1 + this at no trust
   double slip_gate = 0.0;                 ///< NIS of the foot velocity (3 degrees of freedom) above which a foot slips
@@ -77,10 +78,9 @@ class BaseEstimator {
   /// Judges a foot by its velocity, whose residual [m/s] it returns.
   Vector3 gate(const ImuMean& imu, const FootMeasurement& foot, int index) noexcept;
   bool given_up(int foot) const noexcept;
+  bool stands() const noexcept;
   /// The three parts of the error from `begin` on: uncorrelated, of this variance.
   void forget(int begin, double variance) noexcept;
-  /// Its correlations with the rest, times `keep` in 0..1: P stays a covariance.
-  void fade_correlations(int begin, double keep) noexcept;
   void update(const ErrorMeasurement& measurement, double variance) noexcept;
   void write(const SensorSample& now, BaseEstimate& estimate) const noexcept;
 

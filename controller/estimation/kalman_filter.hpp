@@ -10,6 +10,9 @@
 // Joseph's form is evaluated as two rank-m corrections, P1 = P - K (H P), then P1 - (P1 H^T) K^T + K R K^T: the same
 // matrix for any K, errors of K of second order only, in O(n^2 m) operations instead of O(n^3).
 //
+// States may be considered only: a measurement that says something about them that is not to be believed leaves them
+// alone (their rows of K are zero), and P says what is known without it (Schmidt, 1966).
+//
 // An error-state filter holds the nominal state outside: x is the error, zero before an update, z the residual. After
 // the update its owner moves x into the nominal state and sets it to zero.
 #include <Eigen/Cholesky>
@@ -62,12 +65,16 @@ class KalmanFilter {
     return innovation_of(z, H, R, StateTimesMeasurement(P.lazyProduct(H.transpose()))).first;
   }
 
-  /// Takes the measurement z. Changes nothing where the result's nis is NaN.
-  Innovation update(const Measurement& z, const MeasurementMatrix& H, const MeasurementCovariance& R) noexcept {
+  /// Takes the measurement z, which leaves the states of these indices alone. Changes nothing where the result's nis is
+  /// NaN.
+  template <class... Index>
+  Innovation update(const Measurement& z, const MeasurementMatrix& H, const MeasurementCovariance& R,
+                    Index... considered) noexcept {
     const StateTimesMeasurement PHt = P.lazyProduct(H.transpose());
     const auto [innovation, cholesky] = innovation_of(z, H, R, PHt);
     if (std::isnan(innovation.nis)) return innovation;
-    const StateTimesMeasurement K = cholesky.solve(PHt.transpose()).transpose();
+    StateTimesMeasurement K = cholesky.solve(PHt.transpose()).transpose();
+    (K.row(considered).setZero(), ...);
     x += K * innovation.y;
     P -= K.lazyProduct(PHt.transpose());
     const StateTimesMeasurement right = K * R - P.lazyProduct(H.transpose());

@@ -107,6 +107,28 @@ TEST_CASE("WrongStartOfTheBallIsForgottenAtThePredictedRate") {
   CHECK(error.head<3>().norm() < 0.05);
 }
 
+TEST_CASE("ConsideredStatesStayAndTheCovarianceIsThatOfTheGainUsed") {
+  std::mt19937 random(5);
+  std::normal_distribution<double> normal;
+  const Eigen::Matrix4d A = Eigen::Matrix4d::NullaryExpr([&] { return normal(random); });
+  const Eigen::Matrix<double, 2, 4> H = Eigen::Matrix<double, 2, 4>::NullaryExpr([&] { return normal(random); });
+  const Eigen::Matrix2d R = Eigen::Vector2d(0.5, 0.2).asDiagonal();
+  const Eigen::Vector2d z(1.0, -2.0);
+  KalmanFilter<4, 2> filter;
+  filter.x << 1.0, 2.0, 3.0, 4.0;
+  filter.P = A * A.transpose();
+  const Eigen::Matrix4d prior = filter.P;
+  Eigen::Matrix<double, 4, 2> K = prior * H.transpose() * (H * prior * H.transpose() + R).inverse();
+  K.row(1).setZero();
+  K.row(3).setZero();
+  const Eigen::Matrix4d rest = Eigen::Matrix4d::Identity() - K * H;
+  filter.update(z, H, R, 1, 3);
+  CHECK(filter.x(1) == 2.0);
+  CHECK(filter.x(3) == 4.0);
+  CHECK(std::abs(filter.x(0) - 1.0) > 1e-3);
+  CHECK((filter.P - (rest * prior * rest.transpose() + K * R * K.transpose())).cwiseAbs().maxCoeff() < 1e-12);
+}
+
 TEST_CASE("PredictByBlocksEqualsPredictByTheMatrix") {
   const Ball ball;
   std::mt19937 random(3);
