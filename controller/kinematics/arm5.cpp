@@ -154,6 +154,20 @@ RigidTransform arm5_forward(const Arm5Geometry& arm, const Arm5Vector& t) noexce
   return T;
 }
 
+Eigen::Matrix<double, 3, 5> arm5_position_jacobian(const Arm5Geometry& arm, const Arm5Vector& t) noexcept {
+  const double s1 = std::sin(t(0)), c1 = std::cos(t(0));
+  // The tool as seen from joints 4, 3 and 2, whose axes are the arm's plane's normal: x outward, z up.
+  const double x4 = arm.d5 * std::sin(t(1) + t(2) + t(3)), z4 = -arm.d5 * std::cos(t(1) + t(2) + t(3));
+  const double x3 = x4 + arm.a3 * std::cos(t(1) + t(2)), z3 = z4 + arm.a3 * std::sin(t(1) + t(2));
+  const double x2 = x3 + arm.a2 * std::cos(t(1)), z2 = z3 + arm.a2 * std::sin(t(1));
+  const double x = x2 + arm.a1;
+  Eigen::Matrix<double, 3, 5> J;
+  J << -s1 * x + c1 * arm.d2, -c1 * z2, -c1 * z3, -c1 * z4, 0.0,  //
+      c1 * x + s1 * arm.d2, -s1 * z2, -s1 * z3, -s1 * z4, 0.0,    //
+      0.0, x2, x3, x4, 0.0;
+  return J;
+}
+
 Arm5Solutions arm5_ik(const Arm5Geometry& arm, const RigidTransform& T_A5, const Arm5Limits& limits) noexcept {
   const Matrix3& R = T_A5.R;
   const Vector3& p = T_A5.p;

@@ -48,6 +48,9 @@ Arm5Limits arm5_limits(const rigid_body::Model& model) noexcept;
 /// T_A5: the tool in the arm's base frame A.
 RigidTransform arm5_forward(const Arm5Geometry& arm, const Arm5Vector& t) noexcept;
 
+/// d p_A / d t: of the tool's position, in A [m/rad]. The last column is zero: the tool lies on that joint's axis.
+Eigen::Matrix<double, 3, 5> arm5_position_jacobian(const Arm5Geometry& arm, const Arm5Vector& t) noexcept;
+
 enum class Arm5Status : std::uint8_t {
   kOk,
   kUnreachable,    ///< the position is too near the first axis, or the wrist too far from the shoulder or too near it

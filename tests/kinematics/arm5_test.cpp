@@ -193,6 +193,23 @@ TEST_CASE("ArmOfFiveIsTheRigidBodyCoresChain") {
   }
 }
 
+TEST_CASE("ToolsPositionMovesAsItsJacobianSays") {
+  const Arm5Geometry arm = document_arm();
+  constexpr double step = 1e-6, tolerance = 1e-9;
+  std::mt19937 random(kSeed);
+  std::uniform_real_distribution<double> angle(-kPi, kPi);
+  for (int trial = 0; trial < 100; ++trial) {
+    Arm5Vector t;
+    for (int i = 0; i < 5; ++i) t(i) = angle(random);
+    const Eigen::Matrix<double, 3, 5> J = arm5_position_jacobian(arm, t);
+    for (int i = 0; i < 5; ++i) {
+      const Arm5Vector d = step * Arm5Vector::Unit(i);
+      const Vector3 slope = (arm5_forward(arm, t + d).p - arm5_forward(arm, t - d).p) / (2.0 * step);
+      CHECK((J.col(i) - slope).norm() < tolerance);
+    }
+  }
+}
+
 TEST_CASE("CupOfTheReferenceArmIsItsTool") {
   const Arm5Geometry arm = arm5_geometry(arm_model(), 0.251);
   for (const YAML::Node& c : golden_cases(load_golden("rnea_arm5.json"))) {
