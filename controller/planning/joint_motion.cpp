@@ -6,6 +6,8 @@
 namespace stance::planning {
 namespace {
 
+constexpr int kSamples = 12;  // of a quintic, at which its limits are looked at
+
 /// One joint's quintic, from (q, v, a) to (target, speed, 0) in T.
 struct Quintic {
   double q, v, a, c3, c4, c5;
@@ -23,24 +25,59 @@ struct Quintic {
 
   /// Does it keep to the limits from its first tenth to its end? What it has at the start it cannot help.
   bool keeps_to(double max_speed, double max_acceleration, double T) const noexcept {
-    constexpr int samples = 12;
     constexpr double rounding = 1.0 + 1e-9;
-    for (int i = 1; i < samples; ++i) {
-      const double t = T * (0.1 + 0.9 * i / samples);
+    for (int i = 1; i < kSamples; ++i) {
+      const double t = T * (0.1 + 0.9 * i / kSamples);
       if (!(std::abs(speed(t)) <= max_speed * rounding && std::abs(acceleration(t)) <= max_acceleration * rounding)) {
         return false;
       }
     }
     return true;
   }
+
+  bool stays_within(double lower, double upper, double T) const noexcept {
+    for (int i = 1; i < kSamples; ++i) {
+      const double at = position(T * i / kSamples);
+      if (!(lower <= at && at <= upper)) return false;
+    }
+    return true;
+  }
 };
+
+constexpr double kBraking = 0.75;  // of the acceleration: the rest is for steps of dt
 
 /// The speed to have after dt on the fastest way to rest at a distance `e`.
 double braking_speed(double e, double max_speed, double max_acceleration, double dt) noexcept {
-  constexpr double share = 0.75;  // of the acceleration: the rest is for steps of dt
-  const double speed = std::min({max_speed, std::sqrt(2.0 * share * max_acceleration * std::abs(e)),
+  const double speed = std::min({max_speed, std::sqrt(2.0 * kBraking * max_acceleration * std::abs(e)),
                                  0.5 * std::abs(e) / dt});  // the last: no more than half the way in a step
   return std::copysign(speed, e);
+}
+
+/// far(s) of the header: towards + in T.
+double farthest(double v, double s, double T, double max_speed, double a, double b) noexcept {
+  const double p = std::min(max_speed, (T + v / a + s / b) / (1.0 / a + 1.0 / b));
+  const double t_a = (p - v) / a, t_b = (p - s) / b;
+  return 0.5 * (p + v) * t_a + 0.5 * (p + s) * t_b + p * std::max(T - t_a - t_b, 0.0);
+}
+
+/// The speed nearest to `speed` with which a joint at speed v gets a distance `e` on in T; the most that it may have
+/// where none does. It must be able to stop within `above` or `below` the target.
+double passing_speed(double e, double v, double speed, double T, double max_speed, double max_acceleration,
+                     double above, double below) noexcept {
+  constexpr int halvings = 12;
+  const double b = kBraking * max_acceleration;
+  const double towards = std::copysign(1.0, e - 0.5 * (v + speed) * T);
+  const double room = std::max(towards > 0.0 ? above : below, 0.0);
+  double low = towards * speed, high = std::min(max_speed, std::sqrt(2.0 * b * room));
+  const auto arrives = [&](double s) noexcept {
+    return farthest(towards * v, s, T, max_speed, max_acceleration, b) >= towards * e;
+  };
+  if (low >= high || arrives(low)) return speed;
+  for (int i = 0; i < halvings; ++i) {
+    const double middle = 0.5 * (low + high);
+    (arrives(middle) ? high : low) = middle;
+  }
+  return towards * high;
 }
 
 }  // namespace
@@ -61,10 +98,14 @@ void advance(const JointMotionLimits& limits, int joints, const JointVector& tar
       a = ends ? 0.0 : way.acceleration(dt);
       continue;
     }
+    double end = speed[i];
+    if (time_left > dt) {
+      end = passing_speed(target[i] - q, v, end, T, max_speed, max_acceleration, limits.upper[i] - target[i],
+                          target[i] - limits.lower[i]);
+    }
     // Where the line to the target is half a step on.
-    const double e = target[i] - speed[i] * std::max(time_left - 0.5 * dt, 0.0) - q - 0.5 * v * dt;
-    const double wanted =
-        std::clamp(speed[i] + braking_speed(e, max_speed, max_acceleration, dt), -max_speed, max_speed);
+    const double e = target[i] - end * std::max(time_left - 0.5 * dt, 0.0) - q - 0.5 * v * dt;
+    const double wanted = std::clamp(end + braking_speed(e, max_speed, max_acceleration, dt), -max_speed, max_speed);
     a = std::clamp((wanted - v) / dt, -max_acceleration, max_acceleration);
     q += v * dt + 0.5 * a * dt * dt;
     v += a * dt;
@@ -76,6 +117,7 @@ bool keeps_to_limits(const JointMotionLimits& limits, int joints, const JointVec
   for (int i = 0; i < joints; ++i) {
     const Quintic way(motion.q[i], motion.v[i], motion.a[i], target[i], speed[i], time_left);
     if (!way.keeps_to(limits.speed[i], limits.acceleration[i], time_left)) return false;
+    if (!way.stays_within(limits.lower[i], limits.upper[i], time_left)) return false;
   }
   return true;
 }

@@ -8,8 +8,13 @@
 //   T^2/2) / T^5
 // Where that would pass a limit on its way, or no time is left, the joint instead makes for the line along which it
 // would come to the target with that speed, over it by the speed from which it can still stop there, sqrt(2 b |e|) with
-// b a share of its acceleration: as fast as it may, late or not.
+// b a share of its acceleration: as fast as it may. Where it would be late so, it passes the target with the least
+// speed that has it there on time, or the most that it may have: from v to s in T, at most `max_speed` on the way,
+//   far(s) = (p^2 - v^2) / 2a + (p^2 - s^2) / 2b + p (T - (p - v) / a - (p - s) / b)
+//   p      = min(max_speed, (T + v/a + s/b) / (1/a + 1/b))                                    (its greatest speed)
 // From rest to rest over a distance d the quintic's peaks are 15/8 d/T and 10/sqrt(3) d/T^2: the time that it needs.
+#include <limits>
+
 #include "controller/interface/signals.hpp"
 
 namespace stance::planning {
@@ -17,6 +22,9 @@ namespace stance::planning {
 struct JointMotionLimits {
   JointVector speed = JointVector::Zero();         ///< rad/s
   JointVector acceleration = JointVector::Zero();  ///< rad/s^2
+  /// rad, where a joint that passes its target must be able to stop, and which keeps_to_limits() keeps to.
+  JointVector lower = JointVector::Constant(-std::numeric_limits<double>::infinity());
+  JointVector upper = JointVector::Constant(std::numeric_limits<double>::infinity());
 };
 
 /// Where a motion's joints are.

@@ -70,6 +70,46 @@ TEST_CASE("WhereTimeIsShortAJointIsLateAndThenAtRest") {
   CHECK(steps * kStep < 0.9);
 }
 
+TEST_CASE("AJointWithoutTheTimeToRestAtItsTargetPassesItOnTime") {
+  // 0.9 rad from rest in 0.3 s: 0.45 rad is what rest to rest allows, 1.35 rad what it comes at most.
+  JointMotion motion;
+  JointVector target = JointVector::Zero();
+  target[0] = 0.9;
+  const JointVector rest = JointVector::Zero();
+  for (int k = 30; k > 0; --k) advance(limits(), kJoints, target, rest, k * kStep, kStep, motion);
+  CHECK(std::abs(motion.q[0] - 0.9) < 0.01);
+  CHECK(motion.v[0] > 0.5);
+  double farthest = motion.q[0];
+  for (int k = 0; k < 40; ++k) {
+    advance(limits(), kJoints, target, rest, -k * kStep, kStep, motion);
+    farthest = std::max(farthest, motion.q[0]);
+  }
+  CHECK(std::abs(motion.q[0] - 0.9) < 1e-3);
+  CHECK(farthest < 0.9 + 4.5 * 4.5 / (2.0 * 30.0) + 0.05);
+}
+
+TEST_CASE("AJointPassesItsTargetOnlyAsFastAsItCanStopBeforeItsLimit") {
+  JointMotionLimits allowed = limits();
+  allowed.upper[0] = 0.95;
+  JointMotion motion;
+  JointVector target = JointVector::Zero();
+  target[0] = 0.9;
+  const double step_at_most = kStep * std::sqrt(2.0 * 0.75 * 30.0 * 0.05);  // rad, at the speed that stops in 0.05 rad
+  for (int k = 30; k > -40; --k) {
+    advance(allowed, kJoints, target, JointVector::Zero(), k * kStep, kStep, motion);
+    CHECK(motion.q[0] < 0.95 + step_at_most);
+  }
+}
+
+TEST_CASE("AWayThatPassesAJointsLimitDoesNotKeepToTheLimits") {
+  JointMotionLimits allowed = limits();
+  JointVector target = JointVector::Zero(), speed = JointVector::Zero();
+  speed[0] = 2.0;  // it must go back for a run-up
+  CHECK(keeps_to_limits(allowed, kJoints, target, speed, 0.5, JointMotion{}));
+  allowed.lower[0] = -0.02;
+  CHECK_FALSE(keeps_to_limits(allowed, kJoints, target, speed, 0.5, JointMotion{}));
+}
+
 TEST_CASE("TheTimeNeededIsWhatTheQuinticTakesFromRest") {
   JointMotion motion;
   JointVector target = JointVector::Zero();
