@@ -43,7 +43,9 @@ void planner(StrictYaml yaml, int num_joints, behaviours::CatcherConfig& c) {
   p.reach_slack = yaml.number("reach_slack");
   p.commit = yaml.number("commit");
   p.spare_time = yaml.number("spare_time");
+  p.max_facing = yaml.number("max_facing");
   p.facing_cost = yaml.number("facing_cost");
+  p.turned_away_cost = yaml.number("turned_away_cost");
   p.lateness_cost = yaml.number("lateness_cost");
   p.reach_cost = yaml.number("reach_cost");
   p.time_change_cost = yaml.number("time_change_cost");

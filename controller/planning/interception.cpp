@@ -46,7 +46,9 @@ void InterceptionConfig::validate() const {
   require(reach_slack >= 0.0 && reach_slack <= 0.2, "reach_slack", reach_slack, "in 0..0.2 m");
   at_least(commit, "commit", 0.0, "at least 0 s");
   at_least(spare_time, "spare_time", 0.0, "at least 0 s");
+  require(max_facing > 0.0 && max_facing < 1.5, "max_facing", max_facing, "in 0..1.5 rad");
   at_least(facing_cost, "facing_cost", 0.0, "at least 0");
+  at_least(turned_away_cost, "turned_away_cost", 0.0, "at least 0");
   at_least(lateness_cost, "lateness_cost", 0.0, "at least 0");
   at_least(reach_cost, "reach_cost", 0.0, "at least 0");
   at_least(time_change_cost, "time_change_cost", 0.0, "at least 0");
@@ -80,6 +82,18 @@ Interception::Interception(const InterceptionConfig& config, const kinematics::A
   }
 }
 
+double Interception::bearing(const Vector3& p_A) const noexcept {
+  const double along = std::sqrt(std::max(p_A.head<2>().squaredNorm() - arm_.d2 * arm_.d2, 0.0));
+  return std::atan2(p_A.y(), p_A.x()) - std::atan2(-arm_.d2, along);
+}
+
+double Interception::facing(const BallState& ball, double offset) const noexcept {
+  const double t1 = bearing(ball.p_A);
+  const double v_r = std::cos(t1) * ball.v_A.x() + std::sin(t1) * ball.v_A.y();
+  const double in_plane = std::hypot(v_r, ball.v_A.z()) / std::max(ball.v_A.norm(), 1e-9);
+  return std::acos(std::min(std::cos(offset) * in_plane, 1.0));
+}
+
 /// Closes the wrist's circle where the ball is barely out of reach. Returns by how much [m], infinity where that is too
 /// much.
 double Interception::short_of_reach(const Vector3& p_A, double bearing, double pitch,
@@ -102,9 +116,8 @@ double Interception::short_of_reach(const Vector3& p_A, double bearing, double p
 template <typename Take>
 void Interception::postures(const BallState& ball, double offset, const Take& take) const noexcept {
   const Vector3& p = ball.p_A;
-  const double r2 = p.head<2>().squaredNorm();
-  if (!(r2 > arm_.d2 * arm_.d2)) return;
-  const double near_t1 = std::atan2(p.y(), p.x()) - std::atan2(-arm_.d2, std::sqrt(r2 - arm_.d2 * arm_.d2));
+  if (!(p.head<2>().squaredNorm() > arm_.d2 * arm_.d2)) return;
+  const double near_t1 = bearing(p);
   const double v_r = std::cos(near_t1) * ball.v_A.x() + std::sin(near_t1) * ball.v_A.y();
   const double pitch = std::atan2(-v_r, ball.v_A.z()) + offset;
   Vector3 p_reached;
@@ -137,7 +150,9 @@ const InterceptionPlan& Interception::update(double now, const BallState& ball, 
     const double left = time - now;
     const double time_change = plan_.exists() ? config_.time_change_cost * std::abs(time - plan_.time) : 0.0;
     for (const double offset : config_.pitch_offsets) {
-      const double known = config_.facing_cost * offset * offset + time_change;
+      const double angle = facing(then, offset);
+      const double known = config_.facing_cost * angle * angle +
+                           config_.turned_away_cost * std::max(0.0, angle - config_.max_facing) + time_change;
       if (known >= least) continue;
       postures(then, offset, [&](const JointVector& q, double missing) noexcept {
         const double slack = left - time_needed(motion_limits_, kJoints, motion, q);

@@ -7,7 +7,8 @@
 //   pitch = atan2(-v_r, v_z) + offset,  roll 0,       so that for offset 0 the axis is -(v_r, v_z) / |(v_r, v_z)|;
 // from an arm that reaches over its own back the same axis is at the negative pitch. Of all that it costs least,
 //   motion    max_i |q_i - q_now_i| / speed_i                         [s]
-//   facing    offset^2
+//   facing    angle^2, and what it is over `max_facing`: between the cup's axis and the ball's velocity reversed, which
+//             has a part across the arm's plane,  cos(angle) = cos(offset) |(v_r, v_z)| / |v|
 //   lateness  what is missing of `spare_time` between the time needed and the time left
 //   reach     by how much the cup stays short of a ball barely out of reach: the wrist's circle about the shoulder is
 //             closed by up to `reach_slack`
@@ -21,7 +22,7 @@
 
 namespace stance::planning {
 
-inline constexpr int kPitchOffsets = 5;
+inline constexpr int kPitchOffsets = 9;
 
 struct InterceptionConfig {
   double earliest = 0.0;                              ///< s ahead
@@ -33,7 +34,9 @@ struct InterceptionConfig {
   double reach_slack = 0.0;                           ///< m
   double commit = 0.0;                                ///< s
   double spare_time = 0.0;                            ///< s
+  double max_facing = 0.0;                            ///< rad, beyond which a cup takes no ball
   double facing_cost = 0.0;                           ///< 1/rad^2
+  double turned_away_cost = 0.0;                      ///< 1/rad, of what is over max_facing
   double lateness_cost = 0.0;                         ///< 1/s
   double reach_cost = 0.0;                            ///< 1/m
   double time_change_cost = 0.0;                      ///< 1/s
@@ -85,6 +88,10 @@ class Interception {
 
  private:
   void follow(double now, const BallState& ball, const JointMotion& motion) noexcept;
+  /// rad, t1 of an arm whose plane holds `p_A`, on its side.
+  double bearing(const Vector3& p_A) const noexcept;
+  /// rad, between the axis of a cup that meets `ball` at `offset` and the ball's velocity reversed.
+  double facing(const BallState& ball, double offset) const noexcept;
   /// Calls `take(q, short_of)` for each posture with the cup at `ball`'s place, its axis at `offset`.
   template <typename Take>
   void postures(const BallState& ball, double offset, const Take& take) const noexcept;

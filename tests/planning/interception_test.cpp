@@ -2,7 +2,6 @@
 
 #include <catch2/catch_test_macros.hpp>
 #include <cmath>
-#include <numbers>
 #include <random>
 
 #include "controller/config/catcher_config_yaml.hpp"
@@ -60,12 +59,36 @@ TEST_CASE("ABallThroughTheArmsReachIsMetByACupThatFacesIt") {
     const RigidTransform cup = arm.cup(plan.q);
     CHECK((cup.p - plan.p_ABall).norm() <= arm.config.planner.reach_slack + 1e-9);
     const double facing = std::acos(-cup.R.col(2).dot(plan.v_ABall.normalized()));
-    CHECK(facing < 51.0 / 180.0 * std::numbers::pi);
+    CHECK(facing <= arm.config.planner.max_facing + 1e-9);
     for (int i = 0; i < 5; ++i) {
       CHECK(plan.q[i] >= arm.limits.lower(i) + arm.config.planner.limit_margin - 1e-9);
       CHECK(plan.q[i] <= arm.limits.upper(i) - arm.config.planner.limit_margin + 1e-9);
     }
   }
+}
+
+TEST_CASE("ACupIsTurnedAwayFromABallAcrossTheArmsPlaneByNoMoreThanItMay") {
+  const Arm arm;
+  Arm careless;
+  careless.config.planner.facing_cost = careless.config.planner.turned_away_cost = 0.0;
+  std::mt19937 random(7);
+  std::uniform_real_distribution<double> aside(-0.2, 0.2), azimuth(0.2, 0.6);
+  int turned_away = 0;
+  for (int trial = 0; trial < 100; ++trial) {
+    const double from = azimuth(random);
+    const Vector3 aim(0.55 + aside(random), aside(random), 0.8 + aside(random));
+    BallState ball = thrown({3.0 * std::cos(from), 3.0 * std::sin(from), 1.2}, aim, 0.5);
+    ball.coast(0.05);
+    const auto angle = [&](const Arm& of) {
+      Interception interception = of.interception();
+      const InterceptionPlan plan = interception.update(0.0, ball, of.at_its_place());
+      REQUIRE(plan.exists());
+      return std::acos(-of.cup(plan.q).R.col(2).dot(plan.v_ABall.normalized()));
+    };
+    CHECK(angle(arm) <= arm.config.planner.max_facing + 1e-9);
+    if (angle(careless) > arm.config.planner.max_facing) ++turned_away;
+  }
+  CHECK(turned_away > 0);
 }
 
 TEST_CASE("ABallThatPassesOutOfReachIsNotPlannedFor") {
