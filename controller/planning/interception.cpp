@@ -1,5 +1,6 @@
 #include "controller/planning/interception.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -165,7 +166,6 @@ const InterceptionPlan& Interception::update(double now, const BallState& ball, 
         best.time = time;
         best.p_ABall = then.p_A;
         best.v_ABall = then.v_A;
-        best.offset = offset;
         best.q = q;
         best.slack = slack;
       });
@@ -175,23 +175,36 @@ const InterceptionPlan& Interception::update(double now, const BallState& ball, 
   return plan_;
 }
 
-/// The same time and offset, the posture that is nearest to the one before; that one where there is none.
-void Interception::follow(double now, const BallState& ball, const JointMotion& motion) noexcept {
-  BallState then = ball;
-  const double left = plan_.time - now;
-  if (left <= 0.0) return;
-  for (double done = 0.0; done < left; done += config_.step) then.coast(std::min(config_.step, left - done));
-  const JointVector before = plan_.q;
-  double least = std::numeric_limits<double>::infinity();
-  postures(then, plan_.offset, [&](const JointVector& q, double /*missing*/) noexcept {
-    const double change = motion_between(motion_limits_, before, q);
-    if (change >= least) return;
-    least = change;
-    plan_.q = q;
-    plan_.p_ABall = then.p_A;
-    plan_.v_ABall = then.v_A;
-    plan_.slack = left - time_needed(motion_limits_, kJoints, motion, q);
-  });
+/// Newton's iterations of the header's step, each about the time at which the ball passes the cup.
+void Interception::follow(double now, BallState ball, const JointMotion& motion) noexcept {
+  constexpr int iterations = 3;     // from the plan before: the last one moves the cup by far less than a millimetre
+  constexpr double damping = 1e-4;  // of the trace, for an arm that is stretched out
+  double left = plan_.time - now;
+  if (!(left > 0.0)) return;
+  for (double done = 0.0; done < left; done += config_.step) ball.coast(std::min(config_.step, left - done));
+  kinematics::Arm5Vector q = plan_.q.head<kJoints>();
+  const auto w = motion_limits_.acceleration.head<kJoints>().cwiseAbs2().asDiagonal();
+  for (int i = 0; i < iterations; ++i) {
+    const Vector3 p_cup = kinematics::arm5_forward(arm_, q).p;
+    const double sooner = (ball.p_A - p_cup).dot(ball.v_A) / std::max(ball.v_A.squaredNorm(), 1e-9);
+    const double later = std::max(-sooner, -left);
+    ball.coast(later);
+    left += later;
+    const Vector3 along = ball.v_A.normalized(), across = along.unitOrthogonal();
+    Eigen::Matrix<double, 2, 3> D;
+    D << across.transpose(), along.cross(across).transpose();
+    const Eigen::Matrix<double, 2, 5> DJ = D * kinematics::arm5_position_jacobian(arm_, q);
+    const Eigen::Matrix<double, 5, 2> WJD = w * DJ.transpose();
+    Eigen::Matrix2d A = DJ * WJD;
+    A.diagonal().array() += damping * A.trace();
+    q += WJD * A.llt().solve(D * (ball.p_A - p_cup));
+    q = q.cwiseMax(limits_.lower).cwiseMin(limits_.upper);
+  }
+  plan_.q.head<kJoints>() = q;
+  plan_.time = now + left;
+  plan_.p_ABall = ball.p_A;
+  plan_.v_ABall = ball.v_A;
+  plan_.slack = left - time_needed(motion_limits_, kJoints, motion, plan_.q);
 }
 
 }  // namespace stance::planning

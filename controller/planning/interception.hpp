@@ -13,7 +13,10 @@
 //   reach     by how much the cup stays short of a ball barely out of reach: the wrist's circle about the shoulder is
 //             closed by up to `reach_slack`
 //   change    of the plan of the tick before, in time and in posture
-// is the plan. From `commit` before the meeting on, its time and its offset stay; the posture follows the estimate.
+// is the plan. From `commit` before the meeting on, the cup only follows the ball's way, by the least motion: where the
+// estimate's way passes the cup of the posture q by e, across its direction v, with w = accelerations^2
+//   q += W J^T D^T (D J W J^T D^T)^-1 e,      D (2 x 3) the directions across v, J the cup's Jacobian, W = diag(w),
+// and the meeting is when the ball passes the cup there. What the estimate changes along the way costs no motion so.
 #include <array>
 #include <cstdint>
 
@@ -51,7 +54,7 @@ struct BallState {
   Vector3 p_A = Vector3::Zero();  ///< m
   Vector3 v_A = Vector3::Zero();  ///< m/s
   double drag = 0.0;              ///< 1/m, k
-  /// A time `dt` (s, >= 0) on, by the midpoint rule.
+  /// A time `dt` (s, of any sign) on, by the midpoint rule.
   void coast(double dt) noexcept;
 };
 
@@ -66,7 +69,6 @@ struct InterceptionPlan {
   double time = 0.0;                    ///< s, of the caller's clock
   Vector3 p_ABall = Vector3::Zero();    ///< m, where the ball will be
   Vector3 v_ABall = Vector3::Zero();    ///< m/s, the same
-  double offset = 0.0;                  ///< rad, of the pitch
   JointVector q = JointVector::Zero();  ///< rad, the posture that meets it
   double slack = 0.0;                   ///< s, left less needed
   bool committed = false;
@@ -87,7 +89,7 @@ class Interception {
   void reset() noexcept { plan_ = InterceptionPlan{}; }
 
  private:
-  void follow(double now, const BallState& ball, const JointMotion& motion) noexcept;
+  void follow(double now, BallState ball, const JointMotion& motion) noexcept;
   /// rad, t1 of an arm whose plane holds `p_A`, on its side.
   double bearing(const Vector3& p_A) const noexcept;
   /// rad, between the axis of a cup that meets `ball` at `offset` and the ball's velocity reversed.

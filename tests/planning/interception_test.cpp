@@ -131,26 +131,93 @@ TEST_CASE("ALateArmGoesAllTheSameAndSaysSo") {
   CHECK(plan.slack < 0.0);
 }
 
-TEST_CASE("FromItsCommitmentOnAPlanKeepsItsTimeAndFollowsTheBall") {
-  const Arm arm;
+namespace {
+
+/// A plan that has just been committed to, the ball and the instant that it is for.
+struct Committed {
+  Arm arm;
   Interception interception = arm.interception();
   BallState ball = thrown({3.5, 0.0, 1.2}, {0.55, 0.0, 0.8}, 0.8);
-  const double time = interception.update(0.0, ball, arm.at_its_place()).time;
   double now = 0.0;
-  bool committed = false;
-  while (now + 0.02 < time) {
-    now += 0.01;
-    ball.coast(0.01);
-    if (committed) ball.p_A.y() += 0.001;  // the estimate moves
-    const double before = interception.plan().time;
-    const InterceptionPlan& plan = interception.update(now, ball, arm.at_its_place());
-    if (!plan.committed) continue;
-    if (committed) CHECK(plan.time == before);
-    committed = true;
-    CHECK((arm.cup(plan.q).p - plan.p_ABall).norm() < 1e-9);
+
+  Committed() {
+    interception.update(now, ball, arm.at_its_place());
+    while (!interception.plan().committed) {
+      now += 0.01;
+      ball.coast(0.01);
+      interception.update(now, ball, arm.at_its_place());
+    }
   }
-  CHECK(committed);
-  CHECK(interception.plan().p_ABall.y() > 0.003);
+  /// m, from the cup to the ball's way.
+  double off_the_way() const {
+    const InterceptionPlan& plan = interception.plan();
+    const Vector3 from_cup = plan.p_ABall - arm.cup(plan.q).p;
+    return from_cup.cross(plan.v_ABall.normalized()).norm();
+  }
+};
+
+constexpr double kOffTheWay = 1e-4;  // m
+
+}  // namespace
+
+TEST_CASE("FromItsCommitmentOnTheCupFollowsTheBallsWay") {
+  Committed committed;
+  const double before = committed.interception.plan().p_ABall.y();
+  for (int k = 0; k < 10; ++k) {
+    committed.now += 0.01;
+    committed.ball.coast(0.01);
+    committed.ball.p_A += Vector3(0.0, 0.004, 0.003);                                            // the estimate moves
+    const InterceptionPlan& plan = committed.interception.update(committed.now, committed.ball,  //
+                                                                 committed.arm.at_its_place());
+    CHECK(plan.committed);
+    CHECK(committed.off_the_way() < kOffTheWay);
+  }
+  CHECK(committed.interception.plan().p_ABall.y() > before + 0.03);
+}
+
+TEST_CASE("WhatChangesAlongTheBallsWayMovesTheMeetingsTimeAndNotTheArm") {
+  Committed committed;
+  const InterceptionPlan before = committed.interception.plan();
+  committed.ball.coast(0.02);  // the ball is 20 ms further on than was thought
+  const InterceptionPlan& plan =
+      committed.interception.update(committed.now, committed.ball, committed.arm.at_its_place());
+  CHECK(std::abs(plan.time - (before.time - 0.02)) < 1e-4);
+  CHECK((plan.q - before.q).norm() < 1e-3);
+}
+
+TEST_CASE("TheCupFollowsTheBallsWayByLessMotionThanAtTheSamePitch") {
+  Committed committed;
+  const InterceptionPlan before = committed.interception.plan();
+  const kinematics::Arm5Vector q = before.q.head<5>();
+  committed.ball.p_A.z() += 0.03;
+  const InterceptionPlan& plan =
+      committed.interception.update(committed.now, committed.ball, committed.arm.at_its_place());
+  const auto solutions = kinematics::arm5_ik(committed.arm.geometry, committed.arm.cup(plan.q).p, q[1] + q[2] + q[3],
+                                             0.0, committed.arm.limits);
+  REQUIRE(solutions.count > 0);
+  const auto effort = [&](const kinematics::Arm5Vector& to) {
+    return (to - q).cwiseQuotient(committed.arm.config.motion.acceleration.head<5>()).norm();
+  };
+  double least = effort(solutions.t[0]);
+  for (int i = 1; i < solutions.count; ++i) least = std::min(least, effort(solutions.t[i]));
+  CHECK(effort(plan.q.head<5>()) < 0.7 * least);
+}
+
+TEST_CASE("ACommittedPlanStaysWithinTheJointsLimitsWhereverTheBallGoes") {
+  std::mt19937 random(11);
+  std::normal_distribution<double> error(0.0, 0.3);
+  for (int trial = 0; trial < 100; ++trial) {
+    Committed committed;
+    committed.ball.p_A += Vector3(error(random), error(random), error(random));
+    const InterceptionPlan& plan =
+        committed.interception.update(committed.now, committed.ball, committed.arm.at_its_place());
+    REQUIRE(plan.q.allFinite());
+    CHECK(plan.time >= committed.now);
+    for (int i = 0; i < 5; ++i) {
+      CHECK(plan.q[i] >= committed.arm.limits.lower(i) + committed.arm.config.planner.limit_margin - 1e-9);
+      CHECK(plan.q[i] <= committed.arm.limits.upper(i) - committed.arm.config.planner.limit_margin + 1e-9);
+    }
+  }
 }
 
 }  // namespace stance::planning
