@@ -59,4 +59,31 @@ estimation::BallFilter<7>::Estimate BallTrack::at(std::int64_t utime) const noex
   return filter_.predict(std::max(seconds(utime_, utime), 0.0));
 }
 
+estimation::BallFilter<7>::Estimate BallTrack::thrown_at_aim(std::int64_t utime) const noexcept {
+  constexpr double step = 0.01, longest = 2.0;  // s
+  estimation::BallFilter<7>::Estimate estimate = at(utime);
+  planning::BallState ball{estimate.p(), estimate.v(), estimate.x(6)};
+  double t = 0.0;
+  for (; t < longest && (config_.aim - ball.p_A).dot(ball.v_A) > 0.0; t += step) ball.coast(step);
+  if (t == 0.0) return estimate;  // it is past it
+  using Prior = estimation::KalmanFilter<7, 2>;
+  const Vector3 along = ball.v_A.normalized(), across = along.unitOrthogonal();
+  Eigen::Matrix<double, 2, 3> D;
+  D << across.transpose(), along.cross(across).transpose();
+  Prior::MeasurementMatrix H = Prior::MeasurementMatrix::Zero();
+  H.leftCols<3>() = D;
+  H.middleCols<3>(3) = t * D;
+  Prior prior;
+  prior.x = estimate.x;
+  prior.P = estimate.P;
+  const Prior::MeasurementCovariance R =
+      config_.aim_sigma * config_.aim_sigma * Prior::MeasurementCovariance::Identity();
+  const Prior::Measurement z = H * estimate.x + D * (config_.aim - ball.p_A);
+  if (!(prior.innovation(z, H, R).nis / 2.0 <= config_.gate)) return estimate;  // it is thrown elsewhere
+  static_cast<void>(prior.update(z, H, R));
+  estimate.x = prior.x;
+  estimate.P = prior.P;
+  return estimate;
+}
+
 }  // namespace stance::behaviours

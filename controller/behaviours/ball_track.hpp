@@ -4,6 +4,12 @@
 //
 // An observation is believed where its innovation y, of covariance S, has y^T S^-1 y / 3 <= gate. After `max_rejected`
 // in a row that are not, or `max_gap` without one that is, the track starts again with the newest.
+//
+// A ball is thrown at the arm. Where it is to be nearest to `aim`, t from now, at p* with v*, this is a measurement
+// more,
+//   D (p + t v + ...) = D aim + r,     D (2 x 3) the directions across v*,     r ~ N(0, aim_sigma^2 1),
+// which says little beside many observations and much beside the first ones; believed, too, up to `gate`. The filter
+// itself is not told: what it publishes is what was seen.
 #include "controller/behaviours/catcher_config.hpp"
 
 namespace stance::behaviours {
@@ -23,6 +29,9 @@ class BallTrack {
   bool is_known(std::int64_t utime) const noexcept;
   /// At `utime` [us], not before the last observation.
   estimation::BallFilter<7>::Estimate at(std::int64_t utime) const noexcept;
+
+  /// The same, of a ball that is thrown at `aim`.
+  estimation::BallFilter<7>::Estimate thrown_at_aim(std::int64_t utime) const noexcept;
 
   std::int64_t observations() const noexcept { return observations_; }  ///< believed, of this ball
   std::int64_t rejected() const noexcept { return rejected_; }          ///< of the run

@@ -21,6 +21,8 @@ void CatcherConfig::validate() const {
   above(track.max_gap, "filter.max_gap", 0.0, "> 0 s");
   require(track.min_observations >= 2, "filter.min_observations", track.min_observations, ">= 2");
   require(track.clear_of_cup >= 0.0, "filter.clear_of_cup", track.clear_of_cup, ">= 0 m");
+  require(track.aim.allFinite(), "filter.aim's norm", track.aim.norm(), "finite");
+  above(track.aim_sigma, "filter.aim_sigma", 0.0, "> 0 m");
   require(course.give >= 0.0 && course.give < 1.0, "catch.give", course.give, "in 0..1");
   require(course.max_give >= 0.0, "catch.max_give", course.max_give, ">= 0 m/s");
   require(course.give_sigma >= 0.0, "catch.give_sigma", course.give_sigma, ">= 0 m");

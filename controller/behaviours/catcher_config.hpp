@@ -9,11 +9,13 @@ namespace stance::behaviours {
 
 /// Which observations are believed, and of which ball they are.
 struct BallTrackConfig {
-  double gate = 0.0;          ///< NIS per degree of freedom, above which an observation is not believed
-  int max_rejected = 0;       ///< in a row, after which the ball is another one
-  double max_gap = 0.0;       ///< s without a believed observation, the same
-  int min_observations = 0;   ///< before it is planned for
-  double clear_of_cup = 0.0;  ///< m from the cup, below which a ball is the one that was caught
+  double gate = 0.0;              ///< NIS per degree of freedom, above which an observation is not believed
+  int max_rejected = 0;           ///< in a row, after which the ball is another one
+  double max_gap = 0.0;           ///< s without a believed observation, the same
+  int min_observations = 0;       ///< before it is planned for
+  double clear_of_cup = 0.0;      ///< m from the cup, below which a ball is the one that was caught
+  Vector3 aim = Vector3::Zero();  ///< m, in A: balls are thrown at about there
+  double aim_sigma = 0.0;         ///< m, by which they pass it, of each axis across their way
 };
 
 /// The catch's course in time.

@@ -211,7 +211,7 @@ void CatcherController::plan(const RobotState& state, double dt, CatchPlan& plan
 
 void CatcherController::intercept(const RobotState& state, double dt, CatchPlan& plan) noexcept {
   if (track_.is_known(state.utime)) {
-    const auto ball = track_.at(state.utime);
+    const auto ball = track_.thrown_at_aim(state.utime);
     const double now = static_cast<double>(state.utime) * 1e-6;
     // An arm that waits for its run-up is as good as there.
     planning::JointMotion motion = memory_.motion;

@@ -28,6 +28,9 @@ void filter(StrictYaml yaml, behaviours::CatcherConfig& c) {
   c.track.max_gap = yaml.number("max_gap");
   c.track.min_observations = yaml.integer("min_observations");
   c.track.clear_of_cup = yaml.number("clear_of_cup");
+  const auto aim = yaml.numbers("aim", 3);
+  c.track.aim = {aim[0], aim[1], aim[2]};
+  c.track.aim_sigma = yaml.number("aim_sigma");
   yaml.finish();
 }
 
