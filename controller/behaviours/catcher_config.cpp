@@ -26,8 +26,6 @@ void CatcherConfig::validate() const {
   require(course.give >= 0.0 && course.give < 1.0, "catch.give", course.give, "in 0..1");
   require(course.max_give >= 0.0, "catch.max_give", course.max_give, ">= 0 m/s");
   require(course.give_sigma >= 0.0, "catch.give_sigma", course.give_sigma, ">= 0 m");
-  require(course.run_up > 0.0 && course.run_up <= planner.commit, "catch.run_up", course.run_up,
-          "> 0 s, at most planner.commit");
   above(course.settle, "catch.settle", 0.0, "> 0 s");
   above(course.upright_time, "catch.upright_time", 0.0, "> 0 s");
   require(course.hold_time >= course.settle, "catch.hold_time", course.hold_time, ">= catch.settle");

@@ -24,7 +24,6 @@ struct CatchConfig {
   double max_give = 0.0;      ///< m/s, the most of that
   double give_sigma = 0.0;    ///< m, of the ball's place at the meeting, each axis, above which it does not: a cup that
                               ///< gives way follows a new estimate less nimbly
-  double run_up = 0.0;        ///< s before the meeting, in which the cup takes up that velocity
   double settle = 0.0;        ///< s from the meeting to rest
   double upright_time = 0.0;  ///< s, then, to turn the cup up
   double hold_time = 0.0;     ///< s with the ball

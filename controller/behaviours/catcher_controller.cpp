@@ -202,7 +202,6 @@ void CatcherController::plan(const RobotState& state, double dt, CatchPlan& plan
     track_.reset();
     interception_.reset();
     memory_.give.setZero();
-    memory_.running_up = false;
     plan.status = CatchStatus::kNone;
     plan.committed = false;
     plan.observations = 0;
@@ -213,10 +212,7 @@ void CatcherController::intercept(const RobotState& state, double dt, CatchPlan&
   if (track_.is_known(state.utime)) {
     const auto ball = track_.thrown_at_aim(state.utime);
     const double now = static_cast<double>(state.utime) * 1e-6;
-    // An arm that waits for its run-up is as good as there.
-    planning::JointMotion motion = memory_.motion;
-    motion.q += 0.5 * config_.course.run_up * memory_.give;
-    const InterceptionPlan& found = interception_.update(now, {ball.p(), ball.v(), ball.x(6)}, motion);
+    const InterceptionPlan& found = interception_.update(now, {ball.p(), ball.v(), ball.x(6)}, memory_.motion);
     plan.status = status_of(found.status);
     plan.committed = found.committed;
     if (!found.exists()) return;
@@ -224,34 +220,34 @@ void CatcherController::intercept(const RobotState& state, double dt, CatchPlan&
     plan.p_ABall = found.p_ABall;
     plan.q = found.q;
     plan.slack = found.slack;
-    choose_give(found, found.time - now, dt);
+    memory_.give = choose_give(found, found.time - now, dt);
     const RigidTransform cup = kinematics::arm5_forward(arm_, found.q.head<5>());
     plan.p_ACup = cup.p;
     plan.axis_ACup = cup.R.col(2);
   }
 }
 
-/// Whether there is time to give way is looked at until the run-up begins; from then on it stays.
-void CatcherController::choose_give(const InterceptionPlan& found, double left, double dt) noexcept {
-  const double run_up = config_.course.run_up;
-  if (memory_.running_up) return;
-  const bool giving = !memory_.give.isZero();
-  memory_.give = give(found);
-  memory_.running_up = left <= run_up;
-  const bool in_time = memory_.running_up
-                           ? giving && planning::keeps_to_limits(config_.motion, model_.num_joints, found.q,
-                                                                 memory_.give, left + dt, memory_.motion)
-                           : found.slack > (giving ? 0.5 : 1.5) * run_up;
+/// The most of give() that the way there allows; nothing where the meeting's place is not known well enough.
+JointVector CatcherController::choose_give(const InterceptionPlan& found, double left, double dt) const noexcept {
   const auto meeting = track_.at(static_cast<std::int64_t>(found.time * 1e6));
   const double variance = meeting.P.topLeftCorner<3, 3>().trace() / 3.0;
-  if (!in_time || variance > config_.course.give_sigma * config_.course.give_sigma) memory_.give.setZero();
+  if (left > 0.0 && variance <= config_.course.give_sigma * config_.course.give_sigma) {
+    const JointVector whole = give(found);
+    for (const double share : {1.0, 0.75, 0.5, 0.25}) {
+      const JointVector speed = share * whole;
+      if (planning::keeps_to_limits(config_.motion, model_.num_joints, found.q, speed, left + dt, memory_.motion)) {
+        return speed;
+      }
+    }
+  }
+  return JointVector::Zero();
 }
 
 /// The joints' speeds with which the cup yields to the ball, of least norm and within a share of their limits.
 JointVector CatcherController::give(const InterceptionPlan& found) const noexcept {
   constexpr double damping = 0.05;  // m/rad, where the cup cannot move that way
-  constexpr double most = 0.8;      // of a joint's speed, and of what its acceleration gives it in the run-up
-  constexpr double peak = 1.5;      // of the run-up's acceleration over its mean
+  constexpr double most = 0.8;      // of a joint's speed, and of the one from which it settles
+  constexpr double peak = 1.875;    // of a quintic's acceleration over its mean, to rest
   rigid_body::JointJacobian J_b;
   const RigidTransform T = rigid_body::body_jacobian(tree_, cup_, found.q, J_b);
   const Eigen::Matrix<double, 3, 5> J = T.R * J_b.bottomRows<3>().leftCols<5>();
@@ -260,7 +256,7 @@ JointVector CatcherController::give(const InterceptionPlan& found) const noexcep
   JointVector v = JointVector::Zero();
   v.head<5>() = J.transpose() * A.llt().solve(speed * found.v_ABall.normalized());
   const auto attainable =
-      config_.motion.speed.cwiseMin(config_.course.run_up / peak * config_.motion.acceleration).head<5>().array();
+      config_.motion.speed.cwiseMin(config_.course.settle / peak * config_.motion.acceleration).head<5>().array();
   const double share = (v.head<5>().array() / attainable).abs().maxCoeff();
   return share > most ? JointVector(v * (most / share)) : v;
 }
@@ -273,12 +269,8 @@ JointVector CatcherController::upright(const JointVector& q) const noexcept {
   return within_limits(turned);
 }
 
-JointVector CatcherController::within_limits(JointVector q) const noexcept {
-  for (int i = 0; i < model_.num_joints; ++i) {
-    const auto& joint = model_.joints[static_cast<std::size_t>(i)];
-    q[i] = std::clamp(q[i], joint.lower + config_.planner.limit_margin, joint.upper - config_.planner.limit_margin);
-  }
-  return q;
+JointVector CatcherController::within_limits(const JointVector& q) const noexcept {
+  return q.cwiseMax(config_.motion.lower).cwiseMin(config_.motion.upper);
 }
 
 void CatcherController::move(const RobotState& state, double dt, CatchPlan& plan) noexcept {
@@ -293,15 +285,9 @@ void CatcherController::move(const RobotState& state, double dt, CatchPlan& plan
   JointVector target = config_.place, speed = JointVector::Zero();
   double time_left = config_.course.return_time - memory_.phase_time;
   if (plan.phase == CatchPhase::kCatching && interception_.plan().exists()) {
-    const double run_up = config_.course.run_up;
     time_left = seconds(state.utime, plan.catch_utime);
     target = plan.q;
-    if (memory_.running_up || memory_.give.isZero()) {
-      speed = memory_.give;
-    } else {
-      target = within_limits(plan.q - 0.5 * run_up * memory_.give);
-      time_left -= run_up;
-    }
+    speed = memory_.give;
   } else if (plan.phase == CatchPhase::kHolding) {
     const CatchConfig& course = config_.course;
     const JointVector rest = within_limits(plan.q + 0.5 * course.settle * memory_.give);

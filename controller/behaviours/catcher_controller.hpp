@@ -3,9 +3,8 @@
 //
 //   uncalibrated   waits for the camera's points; refused ones are told with their reason
 //   waiting        in its place, until a ball is in flight
-//   catching       on its way to where the interception has it, decided anew each tick. Where there is time, the cup
-//                  meets the ball giving way, with a share of its velocity: it waits before the meeting's place, by
-//                  give run_up / 2, and takes up that velocity in the last run_up
+//   catching       on its way to where the interception has it, decided anew each tick. Where the quintic that leads
+//                  there keeps to the limits, the cup meets the ball giving way, with a share of its velocity
 //   holding        the ball should be in the cup, which comes to rest, and then turns up
 //   returning      to its place
 // The joints follow a reference that planning/joint_motion.hpp moves. Its command, for the middle of its effect:
@@ -40,7 +39,6 @@ class CatcherController {
     bool moving = false;                     ///< the reference has begun
     int periods = 0;                         ///< control periods since the reference was moved
     JointVector give = JointVector::Zero();  ///< rad/s, with which the joints are to meet the ball
-    bool running_up = false;                 ///< to that speed
     planning::JointMotion motion;            ///< the reference, at the last state acted on
     double phase_time = 0.0;                 ///< s, since the phase began
     TickOutput last;                         ///< what HOLD repeats
@@ -54,8 +52,8 @@ class CatcherController {
   void intercept(const RobotState& state, double dt, CatchPlan& plan) noexcept;
   void move(const RobotState& state, double dt, CatchPlan& plan) noexcept;
   JointVector upright(const JointVector& q) const noexcept;
-  JointVector within_limits(JointVector q) const noexcept;
-  void choose_give(const planning::InterceptionPlan& found, double left, double dt) noexcept;
+  JointVector within_limits(const JointVector& q) const noexcept;
+  JointVector choose_give(const planning::InterceptionPlan& found, double left, double dt) const noexcept;
   JointVector give(const planning::InterceptionPlan& found) const noexcept;
   void computed_torque(const planning::JointMotion& reference, JointCommand& command) const noexcept;
   /// What the arm is commanded in DAMP and STOP.

@@ -63,7 +63,6 @@ behaviours::CatchConfig course(StrictYaml yaml) {
   c.give = yaml.number("give");
   c.max_give = yaml.number("max_give");
   c.give_sigma = yaml.number("give_sigma");
-  c.run_up = yaml.number("run_up");
   c.settle = yaml.number("settle");
   c.upright_time = yaml.number("upright_time");
   c.hold_time = yaml.number("hold_time");
@@ -103,6 +102,11 @@ behaviours::CatcherConfig catcher_config(const RobotDescription& robot) {
   yaml.finish();
   c.damping = robot.drives.damping;
   c.place = robot.nominal_joint_position;
+  for (int i = 0; i < robot.model.num_joints; ++i) {
+    const auto& joint = robot.model.joints[static_cast<std::size_t>(i)];
+    c.motion.lower[i] = joint.lower + c.planner.limit_margin;
+    c.motion.upper[i] = joint.upper - c.planner.limit_margin;
+  }
   c.tool = robot.cup->position.z();
   try {
     c.validate();

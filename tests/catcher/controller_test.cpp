@@ -206,7 +206,7 @@ TEST_CASE("AConfigurationThatIsOutOfRangeOrMisspeltIsRefusedByItsKey") {
   CHECK(refusal("  filter:", "  filter:").empty());
   CHECK(refusal("gate: 6.0", "gate: 0.5").find("filter.gate") != std::string::npos);
   CHECK(refusal("commit: 0.12", "commit: -1.0").find("planner.commit") != std::string::npos);
-  CHECK(refusal("give: 0.3", "gives: 0.3").find("give") != std::string::npos);
+  CHECK(refusal("give: 0.4", "gives: 0.4").find("give") != std::string::npos);
   CHECK(refusal("kp: 900.0", "kp: 0").find("computed_torque.kp") != std::string::npos);
   CHECK(refusal("radius: 0.05", "radius: 0").find("cup.radius") != std::string::npos);
   CHECK(refusal("link: l5", "link: l9").find("l9") != std::string::npos);
