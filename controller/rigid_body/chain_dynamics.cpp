@@ -39,26 +39,29 @@ JointVector inverse_dynamics(const ScrewTree& tree, const JointVector& theta, co
   return tau;
 }
 
+/// M_ji = S_j . (I_i S_i), with joint i's screw S_i and the inertia I_i of all that it moves in the base's frame: there
+/// screws, momenta and inertias of different links meet without being carried from one to the next.
 void joint_mass_matrix(const ScrewTree& tree, const JointVector& theta, JointMatrix& M) noexcept {
-  std::array<RigidTransform, kMaxJoints> T;
+  std::array<RigidTransform, kMaxBodies> pose;  // of the links in the base's frame
+  std::array<Vector6, kMaxJoints> S;
   std::array<CompositeInertia, kMaxBodies> composite;
   for (int i = 0; i < tree.num_joints; ++i) {
-    T[i] = tree.motion[i](theta(i));
-    composite[i + 1] = {tree.G[i + 1].mass, Vector3::Zero(), tree.G[i + 1].inertia};
+    const RigidTransform T_ip = tree.motion[i](theta(i));
+    const RigidTransform& parent = pose[tree.parent[i]];
+    RigidTransform& link = pose[i + 1];
+    link.R.noalias() = parent.R * T_ip.R.transpose();
+    link.p = parent.p - link.R * T_ip.p;
+    S[i] = math::adjoint_times(link, tree.A[i]);
   }
   // Joints on different branches do not feel each other.
   M.setZero(tree.num_joints, tree.num_joints);
   for (int i = tree.num_joints - 1; i >= 0; --i) {
-    const CompositeInertia& carried = composite[i + 1];
-    Vector6 F = carried.momentum(tree.A[i].head<3>(), tree.A[i].tail<3>());
-    for (int j = i;; j = tree.parent[j] - 1) {
-      M(j, i) = tree.A[j].dot(F);
-      if (tree.parent[j] == 0) break;
-      F = math::adjoint_transpose_times(T[j], F);
-    }
-    if (tree.parent[i] > 0) composite[tree.parent[i]] += carried_back(T[i], carried);
+    CompositeInertia& carried = composite[i + 1];
+    carried.add_body(tree.G[i + 1].mass, tree.G[i + 1].inertia, pose[i + 1].R, pose[i + 1].p);
+    const Vector6 momentum = carried.momentum(S[i].head<3>(), S[i].tail<3>());
+    for (int j = i; j >= 0; j = tree.parent[j] - 1) M(i, j) = M(j, i) = S[j].dot(momentum);
+    if (tree.parent[i] > 0) composite[tree.parent[i]] += carried;
   }
-  M.triangularView<Eigen::StrictlyLower>() = M.transpose();
 }
 
 void coriolis_matrix(const ScrewTree& tree, const JointVector& theta, const JointVector& thetad,

@@ -17,6 +17,16 @@ struct CompositeInertia {
     return out;
   }
 
+  /// Adds a body with its centre of mass at `r` (m), `R` taking its axes to this frame's; `body_inertia` (kg m^2) is
+  /// about that centre, along its axes.
+  void add_body(double body_mass, const Matrix3& body_inertia, const Matrix3& R, const Vector3& r) noexcept {
+    mass += body_mass;
+    moment += body_mass * r;
+    inertia += R * body_inertia * R.transpose();
+    inertia.diagonal().array() += body_mass * r.squaredNorm();
+    inertia -= body_mass * r * r.transpose();
+  }
+
   CompositeInertia& operator+=(const CompositeInertia& other) noexcept {
     mass += other.mass;
     moment += other.moment;
@@ -24,15 +34,5 @@ struct CompositeInertia {
     return *this;
   }
 };
-
-/// The same inertia in frame a, T_ba taking coordinates in a to those in its own frame b: Ad_T^T I Ad_T.
-inline CompositeInertia carried_back(const RigidTransform& T_ba, const CompositeInertia& I_b) noexcept {
-  const Vector3& p = T_ba.p;  // a's origin
-  const Vector3& h = I_b.moment;
-  Matrix3 about_p = I_b.inertia + h * p.transpose() + p * h.transpose() - (I_b.mass * p) * p.transpose();
-  about_p.diagonal().array() += p.dot(I_b.mass * p - 2.0 * h);
-  const Matrix3& R = T_ba.R;
-  return {I_b.mass, R.transpose() * (h - I_b.mass * p), R.transpose() * about_p * R};
-}
 
 }  // namespace stance::rigid_body

@@ -13,14 +13,8 @@ std::array<CompositeInertia, kMaxBodies> composite_inertias(const Model& model, 
   std::array<CompositeInertia, kMaxBodies> composite;
   for (int b = model.num_bodies() - 1; b >= 0; --b) {
     const Body& body = model.bodies[b];
-    const Matrix3& R = kinematics.R_W[b];
-    const Vector3 r = kinematics.com_W[b] - kinematics.p_W[0];
     CompositeInertia& own = composite[b];
-    own.mass += body.mass;
-    own.moment += body.mass * r;
-    own.inertia += R * body.inertia * R.transpose();
-    own.inertia.diagonal().array() += body.mass * r.squaredNorm();
-    own.inertia -= body.mass * r * r.transpose();
+    own.add_body(body.mass, body.inertia, kinematics.R_W[b], kinematics.com_W[b] - kinematics.p_W[0]);
     if (b == 0) break;
     composite[model.joints[b - 1].parent] += own;
   }
