@@ -139,6 +139,106 @@ TEST_CASE("ManyActiveConstraintsOverALongHorizonAreSolvedExactly") {
   }
 }
 
+TEST_CASE("SetsRevisedAsAWholeGiveWhatTheActiveSetGives") {
+  for (const int num_contacts : {2, 4}) {
+    std::mt19937_64 random(28);
+    const Problem base = standing(40, num_contacts, 0.2);
+    std::vector<std::unique_ptr<StructuredSolver>> paths;
+    for (const Simd simd : available_simd()) paths.push_back(make_structured_solver(base.sizes, kWeight, 1000, simd));
+    for (const auto& path : paths) REQUIRE(path->take_matrices(base));
+    auto fresh = make_structured_solver(base.sizes, kWeight, 1000);
+    REQUIRE(fresh->take_matrices(base));
+    KktCheck kkt(base.sizes);
+    Solution first(base.sizes);
+    Solution other(base.sizes);
+    int revised = 0;
+    for (int tick = 0; tick < 80; ++tick) {
+      Problem problem = base;
+      disturb(problem, 12.0, random);
+      INFO(num_contacts << " contacts, tick " << tick);
+      for (std::size_t i = 0; i < paths.size(); ++i) {
+        paths[i]->take_vectors(problem);
+        REQUIRE(paths[i]->solve() == QpStatus::kSolved);
+        paths[i]->forces(i == 0 ? first.forces : other.forces);
+        CHECK(paths[i]->ended_by_revision() == paths[0]->ended_by_revision());
+        CHECK(paths[i]->iterations() == paths[0]->iterations());
+        if (i > 0) CHECK(other.forces == first.forces);
+      }
+      fresh->reset();
+      fresh->take_vectors(problem);
+      REQUIRE(fresh->solve() == QpStatus::kSolved);
+      REQUIRE_FALSE(fresh->ended_by_revision());
+      fresh->forces(other.forces);
+      CHECK(force_error(first.forces, other.forces) <= kUpdateTolerance);
+      const Residuals residuals = kkt.evaluate(problem, first.forces, first.states);
+      CHECK(residuals.primal <= kUpdateTolerance);
+      CHECK(residuals.dual <= kForceTolerance);
+
+      if (paths[0]->ended_by_revision()) {
+        ++revised;
+        paths[0]->refine();
+        paths[0]->forces(other.forces);
+        CHECK(force_error(first.forces, other.forces) <= kUpdateTolerance);
+      }
+    }
+    CHECK(revised > 40);
+  }
+}
+
+TEST_CASE("WhereRevisionsDoNotEndTheActiveSetTakesOver") {
+  constexpr int kRevisions = 40;  // that are tried
+  constexpr Sizes kSizes = {20, 4};
+  std::mt19937_64 random(29);
+  Solution first(kSizes);
+  Solution other(kSizes);
+  int revised = 0;
+  int taken_over = 0;
+  int refused = 0;
+  for (int model = 0; model < 20; ++model) {
+    const Problem base = any_problem(kSizes, random);
+    auto with_history = make_structured_solver(kSizes, kWeight, 1000);
+    auto bounded = make_structured_solver(kSizes, kWeight, kRevisions);
+    REQUIRE(with_history->take_matrices(base));
+    REQUIRE(bounded->take_matrices(base));
+    int active = 0;  // constraints in the last solution
+    for (int tick = 0; tick < 10; ++tick) {
+      Problem problem = base;
+      disturb(problem, 20.0, random);
+      INFO("model " << model << ", tick " << tick);
+      auto fresh = make_structured_solver(kSizes, kWeight, 1000);
+      REQUIRE(fresh->take_matrices(problem));
+      fresh->take_vectors(problem);
+      REQUIRE(fresh->solve() == QpStatus::kSolved);
+      fresh->forces(other.forces);
+
+      with_history->take_vectors(problem);
+      REQUIRE(with_history->solve() == QpStatus::kSolved);
+      with_history->forces(first.forces);
+      CHECK(force_error(first.forces, other.forces) <= kUpdateTolerance);
+      revised += with_history->ended_by_revision();
+      taken_over += !with_history->ended_by_revision() && active > 100 && with_history->iterations() > kRevisions;
+      active = 0;
+      for (int k = 0; k < kSizes.num_stages; ++k) {
+        active += count_active(problem, k, first.forces[static_cast<std::size_t>(k)], 1e-6);
+      }
+
+      bounded->take_vectors(problem);
+      const QpStatus status = bounded->solve();
+      CHECK(bounded->iterations() <= kRevisions);
+      if (status == QpStatus::kSolved) {
+        bounded->forces(first.forces);
+        CHECK(force_error(first.forces, other.forces) <= kUpdateTolerance);
+      } else {
+        CHECK(status == QpStatus::kMaxIterations);
+        ++refused;
+      }
+    }
+  }
+  CHECK(revised > 20);
+  CHECK(taken_over > 5);
+  CHECK(refused > 5);
+}
+
 TEST_CASE("FarFromTheOriginNothingIsLost") {
   std::mt19937_64 random(26);
   for (int repeat = 0; repeat < 20; ++repeat) {

@@ -1,7 +1,7 @@
 #pragma once
 // What is made of the primitives of simd_*.hpp, the same for every path. Included after one of them, which names the
 // path STANCE_ISA: everything lives in that namespace, so that no function compiled for one machine is ever linked
-// into another's path. For the same reason nothing here or in kernels.hpp uses a template of the standard library.
+// into another's path. For the same reason nothing here or in the kernels uses a template of the standard library.
 //
 // A Vec has eight lanes in two halves of four. Lanes 0-2 hold one 3-vector and lanes 4-6 another; 3 and 7 are spare.
 //

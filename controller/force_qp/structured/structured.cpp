@@ -64,12 +64,14 @@ class Solver final : public StructuredSolver {
         max_active_(std::min(3 * max_rows_, max_columns_)),
         stages_(num_stages(), Stage<NC>{}),
         gains_(num_stages(), Gain<NC>{}),
+        held_gains_(num_stages(), Gain<NC>{}),
+        held_costs_(num_stages(), Cost{}),
         states_(2 * num_stages(), Lanes{}),
         feedforward_(num_stages() * Stage<NC>::kPairs, Lanes{}),
         eight_forces_(3 * max_rows_, Lanes{}),
         eight_feedforward_(num_stages() * 3 * NC, Lanes{}),
         row_numbers_(3 * max_rows_),
-        force_numbers_(6 * max_rows_),
+        force_numbers_(9 * max_rows_),
         columns_(max_columns_ * 3 * max_rows_),
         set_numbers_(5 * stride()),
         L_inverse_((max_active_ + 8) * stride()),
@@ -80,6 +82,7 @@ class Solver final : public StructuredSolver {
         candidates_(kFaces * max_rows_, 0),
         guesses_(kFaces * max_rows_, 0),
         set_constraint_(max_active_ + 1),
+        held_(max_rows_, 0),
         is_active_(kFaces * max_rows_, 0),
         active_in_row_(max_rows_, 0),
         contact_of_slot_(num_stages()),
@@ -93,6 +96,9 @@ class Solver final : public StructuredSolver {
     w.max_iterations = max_iterations;
     w.stages = stages_.data();
     w.gains = gains_.data();
+    w.held = held_.data();
+    w.held_gains = held_gains_.data();
+    w.held_costs = held_costs_.data();
     w.row_stage = row_stage_.data();
     w.fz_min = row_numbers_.data();
     w.fz_max = w.fz_min + max_rows_;
@@ -120,6 +126,7 @@ class Solver final : public StructuredSolver {
     w.L_inverse = L_inverse_.data();
     w.free_forces = force_numbers_.data();
     w.forces = w.free_forces + 3 * max_rows_;
+    w.gradient = w.forces + 3 * max_rows_;
     w.candidates = candidates_.data();
     w.guesses = guesses_.data();
   }
@@ -176,6 +183,7 @@ class Solver final : public StructuredSolver {
   void refine() noexcept override { path_.refine(w_); }
   void take_ahead() noexcept override { path_.take_ahead(w_); }
   int iterations() const noexcept override { return w_.iterations; }
+  bool ended_by_revision() const noexcept override { return w_.ends_held; }
 
   void forces(std::vector<ForceVector>& out) const noexcept override {
     for (std::size_t k = 0; k < num_stages(); ++k) {
@@ -216,12 +224,13 @@ class Solver final : public StructuredSolver {
       put(s.D[j], dynamics.A.block<3, 1>(0, 6 + j), dynamics.A.block<3, 1>(3, 9 + j));
       put(s.C[j], dynamics.A.block<3, 1>(6, 3 + j), Vector3::Zero());
     }
+    for (Lanes& R : s.R) R = Lanes{};
     for (int slot = 0; slot < s.slots; ++slot) {
       const int contact = contacts[static_cast<std::size_t>(slot)];
       const auto bounds = static_cast<std::size_t>(contact);
       for (int d = 0; d < 3; ++d) {
         Lanes& column = s.B[3 * slot + d];
-        s.R[3 * slot + d] = contact < 0 ? 1.0 : data.R[3 * contact + d];
+        s.R[slot / 2].v[slot % 2 * 4 + d] = contact < 0 ? 1.0 : data.R[3 * contact + d];
         if (contact < 0) {
           column = Lanes{};
         } else {
@@ -271,14 +280,21 @@ class Solver final : public StructuredSolver {
 
   void remember() noexcept {
     if (any_remembered_) reset();
-    for (int a = 0; a < w_.active; ++a) {
-      const int row = w_.constraint[a].id / kFaces;
+    const auto remember_faces = [this](int row, unsigned faces) noexcept {
       const auto k = static_cast<std::size_t>(w_.row_stage[row]);
       const int contact = contact_of_slot_[k][static_cast<std::size_t>(row - stages_[k].first_row)];
-      if (contact < 0) continue;
-      unsigned& faces = remembered_[k][static_cast<std::size_t>(contact)];
-      faces |= 1U << (w_.constraint[a].id % kFaces);
+      if (contact < 0) return;
+      remembered_[k][static_cast<std::size_t>(contact)] |= faces;
       any_remembered_ = true;
+    };
+    if (w_.ends_held) {
+      for (int row = 0; row < w_.rows; ++row) {
+        if (w_.held[row] != 0) remember_faces(row, w_.held[row]);
+      }
+    } else {
+      for (int a = 0; a < w_.active; ++a) {
+        remember_faces(w_.constraint[a].id / kFaces, 1U << (w_.constraint[a].id % kFaces));
+      }
     }
     if (!any_remembered_) return;
     remembered_shift_ = duration_.front();
@@ -291,12 +307,14 @@ class Solver final : public StructuredSolver {
   std::size_t max_columns_;
   std::size_t max_active_;
   std::vector<Stage<NC>> stages_;
-  std::vector<Gain<NC>> gains_;
+  std::vector<Gain<NC>> gains_, held_gains_;
+  std::vector<Cost> held_costs_;
   std::vector<Lanes> states_, feedforward_, eight_forces_, eight_feedforward_;
   Numbers row_numbers_, force_numbers_, columns_, set_numbers_, L_inverse_;
   std::vector<const double*> columns_of_set_;
   std::vector<int> row_stage_, constraint_column_, column_constraint_, candidates_, guesses_;
   std::vector<Constraint> set_constraint_;
+  std::vector<std::uint8_t> held_;
   std::vector<std::int8_t> is_active_, active_in_row_;
   std::vector<std::array<int, NC>> contact_of_slot_;            ///< -1 where none fills it
   std::vector<double> start_, duration_;                        ///< s, of the stages

@@ -1,6 +1,7 @@
 #pragma once
 // The force QP by a dual active set over one Riccati factor: exact but for rounding, in work that is linear in the
-// horizon as long as few constraints are active.
+// horizon as long as few constraints are active; where many are, by revisions of whole sets, each linear in the
+// horizon.
 //
 // Stages k = 0..N-1, x = (pose | rate) with pose = (theta | p) and rate = (omega | v), forces f = (f_1 .. f_n):
 //
@@ -36,10 +37,27 @@
 //      multiplier of A reaches zero, whose constraint is dropped. Until nothing is violated by more than 1e-10 m g.
 //   4. What rounding has left of the active constraints is taken out.
 //
-// Why it ends. Dropping in 1 and 2 shrinks a finite set, and passes are counted. Both leave the minimiser under A with
-//   no negative multiplier: a state that 3 may start from. Each full step of 3 raises the dual objective strictly, so
-//   no set comes twice; between two of them are no more partial ones than active constraints. Every problem that
-//   passes inspect() is feasible (f = fz_min along z), so the dual is bounded. A budget ends it all the same.
+// Held faces. The work above grows with the square of A. The minimiser under c_i f = b_i can be had at the cost of a
+//   factor, whatever A is: the faces held at a contact leave f = t + T w, and within them recursion and sweep, from a
+//   nominal path on the faces, stand as they are but for Quu^-1, in whose place there is
+//
+//     T (T'Quu T)^-1 T'        T = [kx 0 ex; 0 ky ey; 0 0 kz], k = 1 where no face fixes the component, else 0;
+//                              ex = +-mu where fx = +-mu fz is held and kz = 1, else 0; ey likewise; T = 0 at fz = 0
+//
+//   The multipliers follow from the gradient d = R (f - fref) + B'p of the minimiser: those of side faces are -+dx and
+//   -+dy, that of a bound of fz is +-(mu (their sum) - dz).
+//
+//   0. With more than 80 constraints to begin with, on two feet or more, and before 1 to 3: hold them, solve, let go of
+//      what has a negative multiplier, hold what is violated, factor again from the last stage that has changed back:
+//      a Newton method for the optimality conditions (Hintermueller, Ito and Kunisch, SIAM J. Optim. 13, 2003), which
+//      may cycle. From the 7th revision on only three contacts in four may change, others each time, which breaks most
+//      cycles. Where there is nothing to revise it is the solution; after 40 revisions 1 to 3 begin from where 0 began.
+//
+// Why it ends. Revisions in 0 are counted. Dropping in 1 and 2 shrinks a finite set, and passes are counted. Both leave
+//   the minimiser under A with no negative multiplier: a state that 3 may start from. Each full step of 3 raises the
+//   dual objective strictly, so no set comes twice; between two of them are no more partial ones than active
+//   constraints. Every problem that passes inspect() is feasible (f = fz_min along z), so the dual is bounded. A budget
+//   ends it all the same.
 //
 // Contacts in swing take no part: each stage has as many inputs as it has contacts in stance.
 //
@@ -72,8 +90,10 @@ class StructuredSolver {
   virtual void refine() noexcept = 0;
   /// To be called where the next problem has the same matrices: takes eight more columns.
   virtual void take_ahead() noexcept = 0;
-  /// Passes and steps of the last solve; 0 where the first guess was right.
+  /// Revisions, passes and steps of the last solve; 0 where the first guess was right.
   virtual int iterations() const noexcept = 0;
+  /// Whether the last solve ended in 0, by revisions of the whole set.
+  virtual bool ended_by_revision() const noexcept = 0;
   /// f_0..f_(N-1), N, of the last solve; exactly zero in swing.
   virtual void forces(std::vector<ForceVector>& out) const noexcept = 0;
   /// The next solve starts from no active constraint.

@@ -18,13 +18,13 @@ struct alignas(64) Lanes {
 template <int NC>
 struct Stage {
   static constexpr int kPairs = (NC + 1) / 2;
-  int slots;         ///< 1, 2 or 4
-  int first_row;     ///< of slot 0, in the arrays over all contacts of all stages
-  bool coupled;      ///< C is not zero
-  Lanes D[3];        ///< columns of D | of E: pose += D rate
-  Lanes C[3];        ///< columns of C, low half: omega += C p
-  Lanes B[3 * NC];   ///< columns of B: rate += B f
-  double R[3 * NC];  ///< 1/N^2
+  int slots;        ///< 1, 2 or 4
+  int first_row;    ///< of slot 0, in the arrays over all contacts of all stages
+  bool coupled;     ///< C is not zero
+  Lanes D[3];       ///< columns of D | of E: pose += D rate
+  Lanes C[3];       ///< columns of C, low half: omega += C p
+  Lanes B[3 * NC];  ///< columns of B: rate += B f
+  Lanes R[kPairs];  ///< 1/N^2
   Lanes Q_pose, Q_rate;
   Lanes g_pose, g_rate;
   Lanes x_ref_pose, x_ref_rate;
@@ -78,6 +78,12 @@ struct Workspace {
   Cost terminal;  ///< P, or Q of the last stage
   // The factor
   Gain<NC>* gains;  ///< num_stages
+  // The factor within faces that are held
+  std::uint8_t* held;  ///< padded_rows, a bit a face
+  bool ends_held;      ///< the last solution was found within held faces, not by the active set
+  Gain<NC>* held_gains;
+  Cost* held_costs;  ///< num_stages, the cost-to-go of x_k, Q included
+  double* gradient;  ///< 3 padded_rows
   // One sweep
   Lanes* z_pose;  ///< num_stages, x_ref's distance to the nominal path
   Lanes* z_rate;
