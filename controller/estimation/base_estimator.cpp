@@ -70,7 +70,7 @@ void BaseEstimatorConfig::validate() const {
       {"accelerometer_bias_noise", accelerometer_bias_noise, 0.0, 1.0},
       {"stance_foot_noise", stance_foot_noise, 0.0, 1.0},
       {"standing_foot_noise", standing_foot_noise, 0.0, 1.0},
-      {"standing_time", standing_time, 0.0, 10.0},
+      {"standing_time", standing_time, 1e-3, 10.0},
       {"unloading_foot_noise", unloading_foot_noise, 0.0, 10.0},
       {"swing_foot_noise", swing_foot_noise, 0.1, 1000.0},
       {"foot_velocity_sigma", foot_velocity_sigma, 1e-5, 10.0},

@@ -50,9 +50,14 @@ unsigned next_faces(const Workspace<NC>& w, const Stage<NC>& s, int row) noexcep
   const double negative = -w.tolerance * least;
 
   const Held h(w.held[row], w.fz_min[row]);
-  // At the apex every side face holds; those that -d pushes against carry the multipliers.
-  const int side_x = h.apex ? (dx > 0.0 ? -1 : 1) : h.x;
-  const int side_y = h.apex ? (dy > 0.0 ? -1 : 1) : h.y;
+  // At the apex every side face holds; those that -d pushes against carry the multipliers. One that carries none to
+  // speak of stays as it is.
+  const auto side_of = [&](int held, double gradient) noexcept {
+    if (!h.apex || (held != 0 && -held * gradient >= negative)) return held;
+    return gradient > 0.0 ? -1 : 1;
+  };
+  const int side_x = side_of(h.x, dx);
+  const int side_y = side_of(h.y, dy);
   const double multiplier_x = -side_x * dx;
   const double multiplier_y = -side_y * dy;
   const double multiplier_z = h.z * (w.friction * (multiplier_x + multiplier_y) - dz);
