@@ -1,14 +1,12 @@
 #include "controller/behaviours/arm3_controller.hpp"
 
-#include <algorithm>
-
+#include "controller/behaviours/tick.hpp"
 #include "controller/rigid_body/chain_dynamics.hpp"
 
 namespace stance::behaviours {
 namespace {
 
 constexpr int kJoints = 3;
-constexpr int kMostPeriods = 10;  // that one tick makes good, after a stall
 
 constexpr safety::Offer kOffer{safety::behaviour_bits({Behaviour::kStand, Behaviour::kTrack, Behaviour::kTrackSmooth})};
 
@@ -54,9 +52,7 @@ void Arm3Controller::step(const TickInput& input, StageClock& clock, TickOutput&
   }
   const SafetyMode mode = ladder_.step(input.periods, memory_.moving);
   if (mode == SafetyMode::kDamp || mode == SafetyMode::kStop) give_up(mode, out.command);
-  trace.safety = mode;
-  trace.faults = ladder_.faults();
-  trace.fault_count = ladder_.counts();
+  ladder_.write(trace);
   memory_.last = out;
   clock.stamp(Stage::kSafety);
 }
@@ -82,7 +78,7 @@ void Arm3Controller::choose_motion(const JointVector& q) noexcept {
 
 void Arm3Controller::play(int periods, TickOutput& out) noexcept {
   Arm3Motion& motion = out.arm3_motion;
-  for (int k = 0; k < std::min(periods, kMostPeriods); ++k) {
+  for (int k = 0; k < periods_made_good(periods); ++k) {
     motion.time = kControlPeriod * static_cast<double>(memory_.steps);
     if (memory_.playing != Behaviour::kStand) ++memory_.steps;
     motion.step = memory_.steps;

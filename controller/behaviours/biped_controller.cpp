@@ -122,9 +122,7 @@ void BipedController::step(const TickInput& input, StageClock& clock, TickOutput
   }
   const SafetyMode mode = ladder_.step(input.periods, has_plan(out));
   if (mode == SafetyMode::kDamp || mode == SafetyMode::kStop) give_up(mode, out);
-  trace.safety = mode;
-  trace.faults = ladder_.faults();
-  trace.fault_count = ladder_.counts();
+  ladder_.write(trace);
   memory_.last = out;
   clock.stamp(Stage::kSafety);
 }

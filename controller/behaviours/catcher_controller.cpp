@@ -5,6 +5,7 @@
 #include <numbers>
 #include <span>
 
+#include "controller/behaviours/tick.hpp"
 #include "controller/calibration/calibration.hpp"
 #include "controller/rigid_body/chain_dynamics.hpp"
 
@@ -14,8 +15,6 @@ namespace {
 using calibration::Status;
 using planning::InterceptionPlan;
 using planning::InterceptionStatus;
-
-constexpr int kMostPeriods = 10;  // that one tick makes good, after a stall
 
 constexpr safety::Offer kOffer{safety::behaviour_bits({Behaviour::kStand, Behaviour::kCatch})};
 
@@ -94,7 +93,7 @@ void CatcherController::step(const TickInput& input, StageClock& clock, TickOutp
   observe(input, out.ball, out.catching);
   clock.stamp(Stage::kEstimate);
   if (fresh) {
-    const double dt = kControlPeriod * std::min(memory_.periods, kMostPeriods);
+    const double dt = tick_duration(memory_.periods);
     memory_.periods = 0;
     plan(input.state, dt, out.catching);
     move(input.state, dt, out.catching);
@@ -113,9 +112,7 @@ void CatcherController::step(const TickInput& input, StageClock& clock, TickOutp
   }
   const SafetyMode mode = ladder_.step(input.periods, out.command.mode == DriveMode::kActive);
   if (mode == SafetyMode::kDamp || mode == SafetyMode::kStop) give_up(mode, out);
-  trace.safety = mode;
-  trace.faults = ladder_.faults();
-  trace.fault_count = ladder_.counts();
+  ladder_.write(trace);
   trace.behaviour = intake_.user_command().behaviour;
   memory_.last = out;
   clock.stamp(Stage::kSafety);

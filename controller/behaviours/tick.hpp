@@ -1,5 +1,5 @@
 #pragma once
-// What the behaviours that end in a force QP say of a tick.
+// What behaviours share of a tick.
 #include "controller/force_qp/force_qp.hpp"
 
 namespace stance::behaviours {
@@ -10,8 +10,10 @@ struct TickState {
   CentroidalState x_ref = CentroidalState::Zero();
 };
 
-/// [s] that one tick integrates over, after `periods` control periods: no more than ten.
-constexpr double tick_duration(int periods) noexcept { return kControlPeriod * (periods < 10 ? periods : 10); }
+/// Of the control periods since the last tick, how many one tick makes good.
+constexpr int periods_made_good(int periods) noexcept { return periods < 10 ? periods : 10; }
+/// [s] that one tick integrates over, after `periods` control periods.
+constexpr double tick_duration(int periods) noexcept { return kControlPeriod * periods_made_good(periods); }
 
 /// Writes a solve into the trace.
 inline void note(const force_qp::Solution& solution, Trace& trace) noexcept {

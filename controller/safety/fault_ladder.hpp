@@ -35,6 +35,12 @@ class FaultLadder {
   /// Of the last finished tick.
   std::uint32_t faults() const noexcept { return finished_faults_; }
   const std::array<std::int64_t, kNumFaults>& counts() const noexcept { return counts_; }
+  /// Writes mode, faults and counts of the last finished tick.
+  void write(Trace& trace) const noexcept {
+    trace.safety = mode_;
+    trace.faults = finished_faults_;
+    trace.fault_count = counts_;
+  }
 
  private:
   static constexpr std::uint32_t bit(Fault fault) { return 1U << static_cast<int>(fault); }
