@@ -1,12 +1,13 @@
 #include "controller/behaviours/biped_config.hpp"
 
 #include <cmath>
-#include <string>
 
 #include "controller/interface/require.hpp"
 
 namespace stance::behaviours {
 namespace {
+
+constexpr int kMaxStages = 100;  // of a horizon; a plan publishes the first kMaxPlanStages of them
 
 constexpr Require require{""};
 
@@ -33,8 +34,7 @@ void BipedConfig::validate() const {
   require(force_limits.normal_force_min >= 0.0, "force_qp.normal_force_min", force_limits.normal_force_min, ">= 0 N");
   require(force_limits.normal_force_max > force_limits.normal_force_min, "force_qp.normal_force_max",
           force_limits.normal_force_max, "> normal_force_min");
-  require(stand.stages >= 1 && stand.stages <= kMaxPlanStages, "stand.stages", stand.stages,
-          ("in 1.." + std::to_string(kMaxPlanStages)).c_str());
+  require(stand.stages >= 1 && stand.stages <= kMaxStages, "stand.stages", stand.stages, "in 1..100");
   require(stand.state_weights.minCoeff() >= 0.0, "stand.state_weights' least", stand.state_weights.minCoeff(), ">= 0");
   require(stand.force_weight > 0.0, "stand.force_weight", stand.force_weight, "> 0");
   require(torque_map.null_space_kp >= 0.0, "torque_map.null_space_kp", torque_map.null_space_kp, ">= 0");
@@ -42,8 +42,7 @@ void BipedConfig::validate() const {
   walk.horizon.validate();
   walk.gait.validate();
   walk.velocity.validate();
-  require(walk.horizon.num_stages() <= kMaxPlanStages, "walk.horizon's stages", walk.horizon.num_stages(),
-          ("<= " + std::to_string(kMaxPlanStages)).c_str());
+  require(walk.horizon.num_stages() <= kMaxStages, "walk.horizon's stages", walk.horizon.num_stages(), "<= 100");
   require(walk.friction > 0.0, "walk.friction", walk.friction, "> 0");
   require(walk.state_weights.minCoeff() >= 0.0, "walk.state_weights' least", walk.state_weights.minCoeff(), ">= 0");
   require(walk.recovery_weights.minCoeff() >= 0.0, "walk.recovery_weights' least", walk.recovery_weights.minCoeff(),

@@ -37,7 +37,8 @@ ENGINES = ("structured", "osqp-condensed", "osqp-sparse")
 HORIZONS = {
     "20": {"num_fine": 10, "num_coarse": 10, "coarse_periods": 3},
     "22, the biped's own": {"num_fine": 10, "num_coarse": 12, "coarse_periods": 3},
-    "32, the most that a plan publishes": {"num_fine": 10, "num_coarse": 22, "coarse_periods": 2},
+    "50 of 0.01 s": {"num_fine": 50, "num_coarse": 0, "coarse_periods": 1},
+    "100 of 0.01 s": {"num_fine": 100, "num_coarse": 0, "coarse_periods": 1},
 }
 SCENARIO = "walk_noisy"
 WALK = 30.0  # s
