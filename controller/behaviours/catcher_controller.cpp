@@ -280,11 +280,13 @@ void CatcherController::move(const RobotState& state, double dt, CatchPlan& plan
     memory_.moving = true;
   }
   JointVector target = config_.place, speed = JointVector::Zero();
+  auto priority = planning::Priority::kSpeed;
   double time_left = config_.course.return_time - memory_.phase_time;
   if (plan.phase == CatchPhase::kCatching && interception_.plan().exists()) {
     time_left = seconds(state.utime, plan.catch_utime);
     target = plan.q;
     speed = memory_.give;
+    priority = planning::Priority::kTime;
   } else if (plan.phase == CatchPhase::kHolding) {
     const CatchConfig& course = config_.course;
     const JointVector rest = within_limits(plan.q + 0.5 * course.settle * memory_.give);
@@ -292,7 +294,7 @@ void CatcherController::move(const RobotState& state, double dt, CatchPlan& plan
     target = settled ? upright(rest) : rest;
     time_left = (settled ? course.settle + course.upright_time : course.settle) - memory_.phase_time;
   }
-  planning::advance(config_.motion, model_.num_joints, target, speed, time_left + dt, dt, motion);
+  planning::advance(config_.motion, model_.num_joints, target, speed, time_left + dt, priority, dt, motion);
   plan.q_ref = motion.q;
   plan.v_ref = motion.v;
 }

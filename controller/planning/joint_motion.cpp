@@ -83,7 +83,7 @@ double passing_speed(double e, double v, double speed, double T, double max_spee
 }  // namespace
 
 void advance(const JointMotionLimits& limits, int joints, const JointVector& target, const JointVector& speed,
-             double time_left, double dt, JointMotion& motion) noexcept {
+             double time_left, Priority priority, double dt, JointMotion& motion) noexcept {
   for (int i = 0; i < joints; ++i) {
     double &q = motion.q[i], &v = motion.v[i], &a = motion.a[i];
     const double max_speed = limits.speed[i], max_acceleration = limits.acceleration[i];
@@ -99,7 +99,7 @@ void advance(const JointMotionLimits& limits, int joints, const JointVector& tar
       continue;
     }
     double end = speed[i];
-    if (time_left > dt) {
+    if (priority == Priority::kTime && time_left > dt) {
       end = passing_speed(target[i] - q, v, end, T, max_speed, max_acceleration, limits.upper[i] - target[i],
                           target[i] - limits.lower[i]);
     }

@@ -24,7 +24,7 @@ TEST_CASE("WhereTimeIsEnoughEveryJointArrivesOnTimeWithTheSpeedThatIsWanted") {
   JointVector target = JointVector::Zero(), speed = JointVector::Zero();
   target.head<kJoints>() << 0.5, -0.8, 1.0, -1.2, 0.3;
   speed.head<kJoints>() << 0.5, -1.0, 0.0, 2.0, -0.5;
-  for (int k = 80; k > 0; --k) advance(limits(), kJoints, target, speed, k * kStep, kStep, motion);
+  for (int k = 80; k > 0; --k) advance(limits(), kJoints, target, speed, k * kStep, Priority::kTime, kStep, motion);
   CHECK((motion.q - target).norm() < 1e-9);
   CHECK((motion.v - speed).norm() < 1e-9);
 }
@@ -44,7 +44,8 @@ TEST_CASE("NoJointPassesItsSpeedOrItsAccelerationWhateverIsAskedAndWheneverItCha
       double left = time(random);
       for (int k = 0; k < 20; ++k, left -= kStep) {
         const JointMotion before = motion;
-        advance(allowed, kJoints, target, speed, left, kStep, motion);
+        advance(allowed, kJoints, target, speed, left, change % 3 == 0 ? Priority::kSpeed : Priority::kTime, kStep,
+                motion);
         for (int i = 0; i < kJoints; ++i) {
           CHECK(std::abs(motion.v[i]) <= (1.0 + 1e-9) * allowed.speed[i]);
           CHECK(std::abs(motion.v[i] - before.v[i]) / kStep <= (1.0 + 1e-9) * allowed.acceleration[i]);
@@ -62,7 +63,7 @@ TEST_CASE("WhereTimeIsShortAJointIsLateAndThenAtRest") {
   double left = 0.1;
   int steps = 0;
   for (; steps < 200 && (std::abs(motion.q[0] - 2.0) > 1e-4 || std::abs(motion.v[0]) > 1e-3); ++steps, left -= kStep) {
-    advance(limits(), kJoints, target, rest, left, kStep, motion);
+    advance(limits(), kJoints, target, rest, left, Priority::kTime, kStep, motion);
     CHECK(motion.q[0] < 2.0 + 1e-3);
   }
   // The fastest way takes 2 / 4.5 + 4.5 / 30 s.
@@ -76,16 +77,29 @@ TEST_CASE("AJointWithoutTheTimeToRestAtItsTargetPassesItOnTime") {
   JointVector target = JointVector::Zero();
   target[0] = 0.9;
   const JointVector rest = JointVector::Zero();
-  for (int k = 30; k > 0; --k) advance(limits(), kJoints, target, rest, k * kStep, kStep, motion);
+  for (int k = 30; k > 0; --k) advance(limits(), kJoints, target, rest, k * kStep, Priority::kTime, kStep, motion);
   CHECK(std::abs(motion.q[0] - 0.9) < 0.01);
   CHECK(motion.v[0] > 0.5);
   double farthest = motion.q[0];
   for (int k = 0; k < 40; ++k) {
-    advance(limits(), kJoints, target, rest, -k * kStep, kStep, motion);
+    advance(limits(), kJoints, target, rest, -k * kStep, Priority::kTime, kStep, motion);
     farthest = std::max(farthest, motion.q[0]);
   }
   CHECK(std::abs(motion.q[0] - 0.9) < 1e-3);
   CHECK(farthest < 0.9 + 4.5 * 4.5 / (2.0 * 30.0) + 0.05);
+}
+
+TEST_CASE("AJointThatIsToRestWhereItPassesTooFastComesBackToItAndNotThroughIt") {
+  const JointVector rest = JointVector::Zero();
+  for (double from = 1.0; from <= 4.5; from += 0.5) {
+    JointMotion motion;
+    motion.v[0] = from;
+    for (int k = 20; k > -60; --k) {
+      advance(limits(), kJoints, rest, rest, k * kStep, Priority::kSpeed, kStep, motion);
+      CHECK(motion.q[0] > -1e-3);
+    }
+    CHECK(motion.q[0] < 1e-3);
+  }
 }
 
 TEST_CASE("AJointPassesItsTargetOnlyAsFastAsItCanStopBeforeItsLimit") {
@@ -96,7 +110,7 @@ TEST_CASE("AJointPassesItsTargetOnlyAsFastAsItCanStopBeforeItsLimit") {
   target[0] = 0.9;
   const double step_at_most = kStep * std::sqrt(2.0 * 0.75 * 30.0 * 0.05);  // rad, at the speed that stops in 0.05 rad
   for (int k = 30; k > -40; --k) {
-    advance(allowed, kJoints, target, JointVector::Zero(), k * kStep, kStep, motion);
+    advance(allowed, kJoints, target, JointVector::Zero(), k * kStep, Priority::kTime, kStep, motion);
     CHECK(motion.q[0] < 0.95 + step_at_most);
   }
 }
