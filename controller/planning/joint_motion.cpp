@@ -68,7 +68,9 @@ double passing_speed(double e, double v, double speed, double T, double max_spee
   const double b = kBraking * max_acceleration;
   const double towards = std::copysign(1.0, e - 0.5 * (v + speed) * T);
   const double room = std::max(towards > 0.0 ? above : below, 0.0);
-  double low = towards * speed, high = std::min(max_speed, std::sqrt(2.0 * b * room));
+  // Beyond what it can have in T, far(s) falls again.
+  double low = towards * speed;
+  double high = std::min({max_speed, std::sqrt(2.0 * b * room), towards * v + max_acceleration * T});
   const auto arrives = [&](double s) noexcept {
     return farthest(towards * v, s, T, max_speed, max_acceleration, b) >= towards * e;
   };
