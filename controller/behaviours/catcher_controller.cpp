@@ -16,6 +16,10 @@ using calibration::Status;
 using planning::InterceptionPlan;
 using planning::InterceptionStatus;
 
+// s before the meeting, from when on the give stays: a quintic so short breaks its limits by a posture's least change,
+// and the arm has that speed by then.
+constexpr double kGiveIsKept = 5 * kControlPeriod;
+
 constexpr safety::Offer kOffer{safety::behaviour_bits({Behaviour::kStand, Behaviour::kCatch})};
 
 static_assert(kMaxCalibrationPoints == calibration::kMaxPoints);
@@ -217,7 +221,8 @@ void CatcherController::intercept(const RobotState& state, double dt, CatchPlan&
     plan.p_ABall = found.p_ABall;
     plan.q = found.q;
     plan.slack = found.slack;
-    memory_.give = choose_give(found, found.time - now, dt);
+    const double left = found.time - now;
+    if (left > kGiveIsKept) memory_.give = choose_give(found, left, dt);
     const RigidTransform cup = kinematics::arm5_forward(arm_, found.q.head<5>());
     plan.p_ACup = cup.p;
     plan.axis_ACup = cup.R.col(2);
@@ -228,7 +233,7 @@ void CatcherController::intercept(const RobotState& state, double dt, CatchPlan&
 JointVector CatcherController::choose_give(const InterceptionPlan& found, double left, double dt) const noexcept {
   const auto meeting = track_.at(static_cast<std::int64_t>(found.time * 1e6));
   const double variance = meeting.P.topLeftCorner<3, 3>().trace() / 3.0;
-  if (left > 0.0 && variance <= config_.course.give_sigma * config_.course.give_sigma) {
+  if (variance <= config_.course.give_sigma * config_.course.give_sigma) {
     const JointVector whole = give(found);
     for (const double share : {1.0, 0.75, 0.5, 0.25}) {
       const JointVector speed = share * whole;
