@@ -60,16 +60,14 @@ estimation::BallFilter<7>::Estimate BallTrack::at(std::int64_t utime) const noex
 }
 
 estimation::BallFilter<7>::Estimate BallTrack::thrown_at_aim(std::int64_t utime) const noexcept {
-  constexpr double step = 0.01, longest = 2.0;  // s
+  constexpr double longest = 2.0;  // s, to the aim or since
   estimation::BallFilter<7>::Estimate estimate = at(utime);
   planning::BallState ball{estimate.p(), estimate.v(), estimate.x(6)};
-  double t = 0.0;
-  for (; t < longest && (config_.aim - ball.p_A).dot(ball.v_A) > 0.0; t += step) ball.coast(step);
-  if (t == 0.0) return estimate;  // it is past it
+  const double t = ball.coast_to_nearest(config_.aim, -longest, longest);
+  constexpr double at_the_end = 0.99;
+  if (!(std::abs(t) < at_the_end * longest)) return estimate;  // it is not at its nearest
   using Prior = estimation::KalmanFilter<7, 2>;
-  const Vector3 along = ball.v_A.normalized(), across = along.unitOrthogonal();
-  Eigen::Matrix<double, 2, 3> D;
-  D << across.transpose(), along.cross(across).transpose();
+  const Eigen::Matrix<double, 2, 3> D = ball.across();
   Prior::MeasurementMatrix H = Prior::MeasurementMatrix::Zero();
   H.leftCols<3>() = D;
   H.middleCols<3>(3) = t * D;

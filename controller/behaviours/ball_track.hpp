@@ -5,7 +5,7 @@
 // An observation is believed where its innovation y, of covariance S, has y^T S^-1 y / 3 <= gate. After `max_rejected`
 // in a row that are not, or `max_gap` without one that is, the track starts again with the newest.
 //
-// A ball is thrown at the arm. Where it is to be nearest to `aim`, t from now, at p* with v*, this is a measurement
+// A ball is thrown at the arm. Where it is nearest to `aim`, t from now or since, at p* with v*, this is a measurement
 // more,
 //   D (p + t v + ...) = D aim + r,     D (2 x 3) the directions across v*,     r ~ N(0, aim_sigma^2 1),
 // which says little beside many observations and much beside the first ones; believed, too, up to `gate`. The filter

@@ -62,6 +62,31 @@ void BallState::coast(double dt) noexcept {
   v_A += dt * acceleration(drag, v_m);
 }
 
+double BallState::coast_to_nearest(const Vector3& point_A, double from, double to) noexcept {
+  constexpr double longest = 0.02, soon = 1e-9;  // s: of a step, and of one that is none
+  constexpr int most = 200;                      // steps
+  double t = 0.0;
+  for (int i = 0; i < most; ++i) {
+    // On a straight way it would be nearest after this.
+    const double left = (point_A - p_A).dot(v_A) / std::max(v_A.squaredNorm(), 1e-9);
+    const double dt =
+        std::clamp(left, std::min(std::max(from - t, -longest), 0.0), std::max(std::min(to - t, longest), 0.0));
+    if (!(std::abs(dt) > soon)) break;
+    coast(dt);
+    t += dt;
+  }
+  return t;
+}
+
+Eigen::Matrix<double, 2, 3> BallState::across() const noexcept {
+  const double speed = v_A.norm();
+  const Vector3 along = speed > 0.0 ? Vector3(v_A / speed) : Vector3::UnitX();
+  const Vector3 first = along.unitOrthogonal();
+  Eigen::Matrix<double, 2, 3> D;
+  D << first.transpose(), along.cross(first).transpose();
+  return D;
+}
+
 Interception::Interception(const InterceptionConfig& config, const kinematics::Arm5Geometry& arm,
                            const kinematics::Arm5Limits& limits, const JointMotionLimits& motion_limits)
     : config_(config),
@@ -178,33 +203,44 @@ const InterceptionPlan& Interception::update(double now, const BallState& ball, 
 /// Newton's iterations of the header's step, each about the time at which the ball passes the cup.
 void Interception::follow(double now, BallState ball, const JointMotion& motion) noexcept {
   constexpr int iterations = 3;     // from the plan before: the last one moves the cup by far less than a millimetre
-  constexpr double damping = 1e-4;  // of the trace, for an arm that is stretched out
+  constexpr double damping = 1e-4;  // of the trace, mu
   double left = plan_.time - now;
   if (!(left > 0.0)) return;
   for (double done = 0.0; done < left; done += config_.step) ball.coast(std::min(config_.step, left - done));
-  kinematics::Arm5Vector q = plan_.q.head<kJoints>();
+  /// A posture, and the ball as it passes the cup there.
+  struct Meeting {
+    kinematics::Arm5Vector q;
+    BallState ball;
+    double left;  // s
+    Eigen::Matrix<double, 2, 3> D;
+    Eigen::Vector2d e;  // m, across the way
+  };
+  const auto meeting = [&](const kinematics::Arm5Vector& q, BallState then, double time_left) noexcept {
+    const Vector3 p_cup = kinematics::arm5_forward(arm_, q).p;
+    time_left += then.coast_to_nearest(p_cup, -time_left, std::max(config_.latest - time_left, 0.0));
+    const Eigen::Matrix<double, 2, 3> D = then.across();
+    return Meeting{q, then, time_left, D, D * (then.p_A - p_cup)};
+  };
+  Meeting met = meeting(plan_.q.head<kJoints>(), ball, left);
   const auto w = motion_limits_.acceleration.head<kJoints>().cwiseAbs2().asDiagonal();
   for (int i = 0; i < iterations; ++i) {
-    const Vector3 p_cup = kinematics::arm5_forward(arm_, q).p;
-    const double sooner = (ball.p_A - p_cup).dot(ball.v_A) / std::max(ball.v_A.squaredNorm(), 1e-9);
-    const double later = std::max(-sooner, -left);
-    ball.coast(later);
-    left += later;
-    const Vector3 along = ball.v_A.normalized(), across = along.unitOrthogonal();
-    Eigen::Matrix<double, 2, 3> D;
-    D << across.transpose(), along.cross(across).transpose();
-    const Eigen::Matrix<double, 2, 5> DJ = D * kinematics::arm5_position_jacobian(arm_, q);
+    const Eigen::Matrix<double, 2, 5> DJ = met.D * kinematics::arm5_position_jacobian(arm_, met.q);
     const Eigen::Matrix<double, 5, 2> WJD = w * DJ.transpose();
     Eigen::Matrix2d A = DJ * WJD;
     A.diagonal().array() += damping * A.trace();
-    q += WJD * A.llt().solve(D * (ball.p_A - p_cup));
-    q = q.cwiseMax(limits_.lower).cwiseMin(limits_.upper);
+    const kinematics::Arm5Vector step = WJD * A.llt().solve(met.e);
+    const double longest = (step.array() / motion_limits_.speed.head<kJoints>().array()).abs().maxCoeff();  // s
+    const double share = longest > met.left ? met.left / longest : 1.0;
+    const kinematics::Arm5Vector q = (met.q + share * step).cwiseMax(limits_.lower).cwiseMin(limits_.upper);
+    const Meeting next = meeting(q, met.ball, met.left);
+    if (!(next.e.squaredNorm() < met.e.squaredNorm())) break;
+    met = next;
   }
-  plan_.q.head<kJoints>() = q;
-  plan_.time = now + left;
-  plan_.p_ABall = ball.p_A;
-  plan_.v_ABall = ball.v_A;
-  plan_.slack = left - time_needed(motion_limits_, kJoints, motion, plan_.q);
+  plan_.q.head<kJoints>() = met.q;
+  plan_.time = now + met.left;
+  plan_.p_ABall = met.ball.p_A;
+  plan_.v_ABall = met.ball.v_A;
+  plan_.slack = met.left - time_needed(motion_limits_, kJoints, motion, plan_.q);
 }
 
 }  // namespace stance::planning

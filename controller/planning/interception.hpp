@@ -15,8 +15,12 @@
 //   change    of the plan of the tick before, in time and in posture
 // is the plan. From `commit` before the meeting on, the cup only follows the ball's way, by the least motion: where the
 // estimate's way passes the cup of the posture q by e, across its direction v, with w = accelerations^2
-//   q += W J^T D^T (D J W J^T D^T)^-1 e,      D (2 x 3) the directions across v, J the cup's Jacobian, W = diag(w),
-// and the meeting is when the ball passes the cup there. What the estimate changes along the way costs no motion so.
+//   q += s W J^T D^T (D J W J^T D^T + mu 1)^-1 e,   D (2 x 3) the directions across v, J the cup's Jacobian, W =
+//   diag(w),
+// within the joints' limits, while that brings the cup nearer to the way, and the meeting is when the ball passes the
+// cup there. What the estimate changes along the way costs no motion so. s <= 1 leaves each joint no more than its
+// speed takes it in the time left, and mu is a small share of the trace: a stretched arm may not get nearer.
+// `min_height` is not looked at any more.
 #include <array>
 #include <cstdint>
 
@@ -37,7 +41,7 @@ struct InterceptionConfig {
   double reach_slack = 0.0;                           ///< m
   double commit = 0.0;                                ///< s
   double spare_time = 0.0;                            ///< s
-  double max_facing = 0.0;                            ///< rad, beyond which a cup takes no ball
+  double max_facing = 0.0;                            ///< rad, beyond which turned_away_cost counts
   double facing_cost = 0.0;                           ///< 1/rad^2
   double turned_away_cost = 0.0;                      ///< 1/rad, of what is over max_facing
   double lateness_cost = 0.0;                         ///< 1/s
@@ -56,6 +60,11 @@ struct BallState {
   double drag = 0.0;              ///< 1/m, k
   /// A time `dt` (s, of any sign) on, by the midpoint rule.
   void coast(double dt) noexcept;
+  /// To where it is nearest to `point_A` [m], at most back to `from` (s, <= 0) and on to `to` (s, >= 0). Returns the
+  /// time that this took [s].
+  double coast_to_nearest(const Vector3& point_A, double from, double to) noexcept;
+  /// Two directions across its way, of unit length and square to each other.
+  Eigen::Matrix<double, 2, 3> across() const noexcept;
 };
 
 enum class InterceptionStatus : std::uint8_t {

@@ -59,10 +59,24 @@ TEST_CASE("ABallsAimTellsMuchBesideItsFirstFramesAndNothingBesideManyGoodOnes") 
   CHECK(std::abs(last.told - last.not_told) < 0.05 * last.not_told);
 }
 
-TEST_CASE("ABallThatIsPastTheAimIsWhereItWasSeen") {
+TEST_CASE("WhatTheAimTellsOfABallStaysWhenTheBallPassesIt") {
   const CatcherConfig config = config::catcher_config(test::catcher());
   BallTrack track(config.track, config.filter);
-  planning::BallState ball{{0.4, 0.1, 0.9}, {-5.0, 0.0, 0.0}, 0.0};
+  planning::BallState ball{{0.8, 0.1, 0.9}, {-5.0, 0.0, 1.0}, 0.0};
+  std::int64_t utime = 0;
+  for (int i = 0; i < 5; ++i, utime += 10'000, ball.coast(kFrame)) static_cast<void>(track.observe(utime, ball.p_A));
+  // It passes the aim 15 ms from here.
+  REQUIRE((track.thrown_at_aim(utime).p() - track.at(utime).p()).norm() > 1e-4);
+  const auto before = track.thrown_at_aim(utime), after = track.thrown_at_aim(utime + 30'000);
+  planning::BallState then{before.p(), before.v(), 0.0};
+  then.coast(0.03);
+  CHECK((then.p_A - after.p()).norm() < 1e-4);
+}
+
+TEST_CASE("ABallThatIsNowhereNearestToTheAimInTimeIsWhereItWasSeen") {
+  const CatcherConfig config = config::catcher_config(test::catcher());
+  BallTrack track(config.track, config.filter);
+  planning::BallState ball{{0.6, 0.0, 60.0}, {0.0, 0.0, 0.0}, 0.0};  // it falls for 3.5 s
   std::int64_t utime = 0;
   for (int i = 0; i < 5; ++i, utime += 10'000, ball.coast(kFrame)) static_cast<void>(track.observe(utime, ball.p_A));
   CHECK(track.thrown_at_aim(utime).x == track.at(utime).x);

@@ -2,6 +2,7 @@
 
 #include <catch2/catch_test_macros.hpp>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <random>
 
@@ -221,6 +222,61 @@ TEST_CASE("ACommittedPlanStaysWithinTheJointsLimitsWhereverTheBallGoes") {
       CHECK(plan.q[i] <= committed.arm.limits.upper(i) - committed.arm.config.planner.limit_margin + 1e-9);
     }
   }
+}
+
+TEST_CASE("AStretchedArmGoesNoFartherForABallThatItCannotReachAndNeverLosesGround") {
+  // Falling past the farthest point at the shoulder's height, up to reach_slack out of reach.
+  const Arm arm;
+  for (double radius = 0.85; radius < 1.2; radius += 0.005) {
+    Interception interception = arm.interception();
+    BallState ball{{radius, 0.0, 3.0}, {0.0, 0.0, -1.0}, 0.0};
+    JointMotion motion = arm.at_its_place();
+    double now = 0.0;
+    if (!interception.update(now, ball, motion).exists()) continue;
+    double miss = std::numeric_limits<double>::infinity();
+    for (bool was_committed = false; interception.plan().time > now + 0.01;) {
+      now += 0.01;
+      ball.coast(0.01);
+      const InterceptionPlan before = interception.plan();
+      const InterceptionPlan& plan = interception.update(now, ball, motion);
+      if (!plan.committed) continue;
+      const double off = (plan.p_ABall - arm.cup(plan.q).p).cross(plan.v_ABall.normalized()).norm();
+      if (was_committed) CHECK(off < miss + 1e-6);
+      miss = off;
+      was_committed = true;
+      const double moved =
+          ((plan.q - before.q).head<5>().array() / arm.config.motion.speed.head<5>().array()).abs().maxCoeff();
+      CHECK(moved < 3.0 * (before.time - now) + 0.01);
+      motion.q = plan.q;
+    }
+  }
+}
+
+TEST_CASE("ACommittedPlansTimeStaysWithinWhatIsPlannedForEvenForABallAtRest") {
+  Committed committed;
+  committed.ball.p_A += Vector3(2.0, 0.0, 0.0);
+  committed.ball.v_A.setZero();
+  const InterceptionPlan& plan =
+      committed.interception.update(committed.now, committed.ball, committed.arm.at_its_place());
+  CHECK(plan.q.allFinite());
+  CHECK(plan.time >= committed.now);
+  CHECK(plan.time <= committed.now + committed.arm.config.planner.latest + 1e-9);
+}
+
+TEST_CASE("ABallCoastsToWhereItIsNearestToAPointForwardAndBack") {
+  const Vector3 point(0.5, 0.1, 0.8);
+  const BallState nearest = thrown({3.5, 0.0, 1.2}, {0.55, 0.0, 0.8}, 0.8);
+  for (const double start : {0.1, 0.5, 1.0}) {
+    BallState ball = nearest;
+    ball.coast(start);
+    const double t = ball.coast_to_nearest(point, -1.0, 1.0);
+    CHECK(std::abs((point - ball.p_A).dot(ball.v_A)) < 1e-6);
+    CHECK(std::abs(start + t - 0.8) < 0.1);
+  }
+  BallState ball = nearest;
+  CHECK(std::abs(ball.coast_to_nearest(point, -0.1, 0.2) - 0.2) < 1e-12);
+  CHECK((ball.across() * ball.across().transpose() - Eigen::Matrix2d::Identity()).norm() < 1e-12);
+  CHECK((ball.across() * ball.v_A).norm() < 1e-12);
 }
 
 }  // namespace stance::planning
