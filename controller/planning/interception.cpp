@@ -241,6 +241,7 @@ void Interception::follow(double now, BallState ball, const JointMotion& motion)
   plan_.p_ABall = met.ball.p_A;
   plan_.v_ABall = met.ball.v_A;
   plan_.slack = met.left - time_needed(motion_limits_, kJoints, motion, plan_.q);
+  plan_.status = plan_.slack >= 0.0 ? InterceptionStatus::kPlanned : InterceptionStatus::kTime;
 }
 
 }  // namespace stance::planning

@@ -263,6 +263,16 @@ TEST_CASE("ACommittedPlansTimeStaysWithinWhatIsPlannedForEvenForABallAtRest") {
   CHECK(plan.time <= committed.now + committed.arm.config.planner.latest + 1e-9);
 }
 
+TEST_CASE("ACommittedPlanThatTheArmIsLateForSaysSo") {
+  Committed committed;
+  JointMotion away = committed.arm.at_its_place();
+  away.q[0] -= 2.0;
+  const InterceptionPlan& plan = committed.interception.update(committed.now, committed.ball, away);
+  REQUIRE(plan.committed);
+  CHECK(plan.slack < 0.0);
+  CHECK(plan.status == InterceptionStatus::kTime);
+}
+
 TEST_CASE("ABallCoastsToWhereItIsNearestToAPointForwardAndBack") {
   const Vector3 point(0.5, 0.1, 0.8);
   const BallState nearest = thrown({3.5, 0.0, 1.2}, {0.55, 0.0, 0.8}, 0.8);
