@@ -12,6 +12,7 @@ namespace stance::planning {
 namespace {
 
 constexpr int kJoints = 5;
+constexpr double kStaysCommitted = 1.5;  // of `commit`: an estimate that moves the meeting a little starts no new plan
 
 Vector3 acceleration(double drag, const Vector3& v) noexcept {
   return Vector3(0.0, 0.0, -kGravity) - drag * v.norm() * v;
@@ -159,7 +160,8 @@ void Interception::postures(const BallState& ball, double offset, const Take& ta
 }
 
 const InterceptionPlan& Interception::update(double now, const BallState& ball, const JointMotion& motion) noexcept {
-  plan_.committed = plan_.exists() && plan_.time - now < config_.commit;
+  const double commit = plan_.committed ? kStaysCommitted * config_.commit : config_.commit;
+  plan_.committed = plan_.exists() && plan_.time - now < commit;
   if (plan_.committed) {
     follow(now, ball, motion);
     return plan_;

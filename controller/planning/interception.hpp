@@ -20,7 +20,7 @@
 // within the joints' limits, while that brings the cup nearer to the way, and the meeting is when the ball passes the
 // cup there. What the estimate changes along the way costs no motion so. s <= 1 leaves each joint no more than its
 // speed takes it in the time left, and mu is a small share of the trace: a stretched arm may not get nearer.
-// `min_height` is not looked at any more.
+// `min_height` is not looked at any more. A meeting put off beyond 1.5 `commit` is another ball's, and planned anew.
 #include <array>
 #include <cstdint>
 

@@ -252,6 +252,19 @@ TEST_CASE("AStretchedArmGoesNoFartherForABallThatItCannotReachAndNeverLosesGroun
   }
 }
 
+TEST_CASE("APlanThatIsCommittedStaysSoWhereTheMeetingIsPutOffALittleAndIsMadeAnewWhereItIsAnotherBalls") {
+  Committed little, much;
+  little.ball.coast(-0.03);
+  much.ball.coast(-0.3);
+  for (Committed* committed : {&little, &much}) {
+    committed->interception.update(committed->now, committed->ball, committed->arm.at_its_place());
+    committed->interception.update(committed->now, committed->ball, committed->arm.at_its_place());
+  }
+  CHECK(little.interception.plan().time - little.now > little.arm.config.planner.commit);
+  CHECK(little.interception.plan().committed);
+  CHECK_FALSE(much.interception.plan().committed);
+}
+
 TEST_CASE("ACommittedPlansTimeStaysWithinWhatIsPlannedForEvenForABallAtRest") {
   Committed committed;
   committed.ball.p_A += Vector3(2.0, 0.0, 0.0);
