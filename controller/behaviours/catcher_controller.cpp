@@ -249,7 +249,7 @@ JointVector CatcherController::choose_give(const InterceptionPlan& found, double
 JointVector CatcherController::give(const InterceptionPlan& found) const noexcept {
   constexpr double damping = 0.05;  // m/rad, where the cup cannot move that way
   constexpr double most = 0.8;      // of a joint's speed, and of the one from which it settles
-  constexpr double peak = 1.875;    // of a quintic's acceleration over its mean, to rest
+  constexpr double peak = 1.5;      // of the acceleration over its mean, of the quintic to rest at half the way
   rigid_body::JointJacobian J_b;
   const RigidTransform T = rigid_body::body_jacobian(tree_, cup_, found.q, J_b);
   const Eigen::Matrix<double, 3, 5> J = T.R * J_b.bottomRows<3>().leftCols<5>();
