@@ -15,8 +15,7 @@
 //   change    of the plan of the tick before, in time and in posture
 // is the plan. From `commit` before the meeting on, the cup only follows the ball's way, by the least motion: where the
 // estimate's way passes the cup of the posture q by e, across its direction v, with w = accelerations^2
-//   q += s W J^T D^T (D J W J^T D^T + mu 1)^-1 e,   D (2 x 3) the directions across v, J the cup's Jacobian, W =
-//   diag(w),
+//   q += s W J^T D^T (D J W J^T D^T + mu 1)^-1 e,  D (2 x 3): across v,  J: the cup's Jacobian,  W = diag(w),
 // within the joints' limits, while that brings the cup nearer to the way, and the meeting is when the ball passes the
 // cup there. What the estimate changes along the way costs no motion so. s <= 1 leaves each joint no more than its
 // speed takes it in the time left, and mu is a small share of the trace: a stretched arm may not get nearer.
