@@ -69,7 +69,7 @@ CatcherController::CatcherController(const CatcherConfig& config, const rigid_bo
       ladder_(config.fault_ladder),
       intake_(config.intake, model_, 0, kOffer),
       track_(config.track, config.filter),
-      interception_(config.planner, arm_, kinematics::arm5_limits(model), config.motion) {
+      interception_(config.planner, arm_, config.motion) {
   config_.validate();
   start_run(0);
 }

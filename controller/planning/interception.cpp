@@ -89,19 +89,17 @@ Eigen::Matrix<double, 2, 3> BallState::across() const noexcept {
 }
 
 Interception::Interception(const InterceptionConfig& config, const kinematics::Arm5Geometry& arm,
-                           const kinematics::Arm5Limits& limits, const JointMotionLimits& motion_limits)
+                           const JointMotionLimits& motion_limits)
     : config_(config),
       arm_(arm),
-      limits_(limits),
+      limits_{motion_limits.lower.head<kJoints>(), motion_limits.upper.head<kJoints>()},
       motion_limits_(motion_limits),
       farthest_(std::hypot(std::abs(arm.a1) + arm.a2 + arm.a3 + std::abs(arm.d5), arm.d2) + config.reach_slack) {
   config_.validate();
   for (int i = 0; i < kJoints; ++i) {
-    limits_.lower(i) += config_.limit_margin;
-    limits_.upper(i) -= config_.limit_margin;
-    if (!(limits_.lower(i) < limits_.upper(i))) {
-      throw std::invalid_argument("planner.limit_margin leaves joint " + std::to_string(i + 1) +
-                                  " no range: make it smaller");
+    if (!(std::isfinite(limits_.lower(i)) && std::isfinite(limits_.upper(i)) && limits_.lower(i) < limits_.upper(i))) {
+      throw std::invalid_argument("joint " + std::to_string(i + 1) +
+                                  " has no range: give it finite limits, and make planner.limit_margin smaller");
     }
     if (!(motion_limits_.speed(i) > 0.0 && motion_limits_.acceleration(i) > 0.0)) {
       throw std::invalid_argument("planner.speed and planner.acceleration must be > 0 for every joint");

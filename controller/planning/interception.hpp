@@ -36,7 +36,7 @@ struct InterceptionConfig {
   double step = 0.0;                                  ///< s between candidates
   std::array<double, kPitchOffsets> pitch_offsets{};  ///< rad, of the cup's axis from the ball's velocity
   double min_height = 0.0;                            ///< m, of the cup over A's origin
-  double limit_margin = 0.0;                          ///< rad, that a plan keeps from the joints' limits
+  double limit_margin = 0.0;                          ///< rad, from the joints' limits to the motion's
   double reach_slack = 0.0;                           ///< m
   double commit = 0.0;                                ///< s
   double spare_time = 0.0;                            ///< s
@@ -86,9 +86,9 @@ struct InterceptionPlan {
 
 class Interception {
  public:
-  /// Throws std::invalid_argument: config.validate()'s, or limits that leave nothing within the margin.
+  /// Throws std::invalid_argument: config.validate()'s, or motion limits that are not finite or leave a joint nothing.
   Interception(const InterceptionConfig& config, const kinematics::Arm5Geometry& arm,
-               const kinematics::Arm5Limits& limits, const JointMotionLimits& motion_limits);
+               const JointMotionLimits& motion_limits);
 
   /// Plans for the ball that is in `ball` at `now` [s], for an arm in `motion`.
   const InterceptionPlan& update(double now, const BallState& ball, const JointMotion& motion) noexcept;

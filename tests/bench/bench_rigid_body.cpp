@@ -130,7 +130,7 @@ void interception() {
   const auto robot = config::robot_from_texts(read("robots/catcher/catcher.yaml"), read("robots/catcher/catcher.urdf"));
   const behaviours::CatcherConfig config = config::catcher_config(robot);
   const kinematics::Arm5Geometry arm = kinematics::arm5_geometry(robot.model, config.tool);
-  planning::Interception planner(config.planner, arm, kinematics::arm5_limits(robot.model), config.motion);
+  planning::Interception planner(config.planner, arm, config.motion);
   planning::JointMotion motion;
   motion.q = config.place;
   std::mt19937 random(6);

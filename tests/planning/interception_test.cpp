@@ -5,6 +5,8 @@
 #include <limits>
 #include <numbers>
 #include <random>
+#include <stdexcept>
+#include <string>
 
 #include "controller/config/catcher_config_yaml.hpp"
 
@@ -19,7 +21,7 @@ struct Arm {
   kinematics::Arm5Geometry geometry = kinematics::arm5_geometry(robot.model, config.tool);
   kinematics::Arm5Limits limits = kinematics::arm5_limits(robot.model);
 
-  Interception interception() const { return {config.planner, geometry, limits, config.motion}; }
+  Interception interception() const { return {config.planner, geometry, config.motion}; }
   JointMotion at_its_place() const {
     JointMotion motion;
     motion.q = config.place;
@@ -300,6 +302,25 @@ TEST_CASE("ABallCoastsToWhereItIsNearestToAPointForwardAndBack") {
   CHECK(std::abs(ball.coast_to_nearest(point, -0.1, 0.2) - 0.2) < 1e-12);
   CHECK((ball.across() * ball.across().transpose() - Eigen::Matrix2d::Identity()).norm() < 1e-12);
   CHECK((ball.across() * ball.v_A).norm() < 1e-12);
+}
+
+TEST_CASE("AnArmWithoutFiniteLimitsOrWithNoRangeLeftIsRefusedByItsJoint") {
+  const auto refusal = [](double lower, double upper) -> std::string {
+    Arm arm;
+    arm.config.motion.lower[2] = lower;
+    arm.config.motion.upper[2] = upper;
+    try {
+      static_cast<void>(arm.interception());
+    } catch (const std::invalid_argument& error) {
+      return error.what();
+    }
+    return "";
+  };
+  constexpr double infinity = std::numeric_limits<double>::infinity();
+  CHECK(refusal(-1.0, 1.0).empty());
+  CHECK(refusal(-infinity, 1.0).find("joint 3") != std::string::npos);
+  CHECK(refusal(-1.0, infinity).find("joint 3") != std::string::npos);
+  CHECK(refusal(1.0, 1.0).find("limit_margin") != std::string::npos);
 }
 
 }  // namespace stance::planning
