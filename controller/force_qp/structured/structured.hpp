@@ -50,8 +50,8 @@
 //   0. With more than 80 constraints to begin with, on two feet or more, and before 1 to 3: hold them, solve, let go of
 //      what has a negative multiplier, hold what is violated, factor again from the last stage that has changed back:
 //      a Newton method for the optimality conditions (Hintermueller, Ito and Kunisch, SIAM J. Optim. 13, 2003), which
-//      may cycle. From the 7th revision on only the first contact that is to change and three in four of the others may,
-//      others each time, which breaks most cycles. Where there is nothing to revise it is the solution; after 40
+//      may cycle. From the 7th revision on only the first contact that is to change and three in four of the others
+//      may, others each time, which breaks most cycles. Where there is nothing to revise it is the solution; after 40
 //      revisions 1 to 3 begin from where 0 began, with the budget that is left.
 //
 // Why it ends. Revisions in 0 are counted. Dropping in 1 and 2 shrinks a finite set, and passes are counted. Both leave
