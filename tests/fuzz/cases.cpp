@@ -237,6 +237,17 @@ Problem problem_from_bytes(std::span<const std::uint8_t> bytes) {
   return problem;
 }
 
+Engines::Engines(int fallback_iterations) {
+  settings_.engine = QpEngine::kStructured;
+  settings_.fallback_iterations = fallback_iterations;
+}
+
+ForceQp& Engines::of(const Sizes& sizes) {
+  auto& engine = engines_[{sizes.num_stages, sizes.num_contacts}];
+  if (engine == nullptr) engine = make_force_qp(settings_, sizes, kTypicalForce);
+  return *engine;
+}
+
 std::string fault_of(const Problem& problem, const Solution& solution, int max_iterations) {
   const bool valid = is_valid(problem);
   if (solution.iterations < 0 || solution.iterations > max_iterations) {

@@ -1,12 +1,28 @@
 #pragma once
 // Force QPs for the fuzzer: from a number, of the structure and feasible; from bytes, whatever they say.
 #include <cstdint>
+#include <map>
+#include <memory>
 #include <span>
 #include <string>
 
 #include "controller/force_qp/force_qp.hpp"
 
 namespace stance::force_qp::test {
+
+constexpr double kTypicalForce = 129.0;  // N
+
+/// The structured engine, one for each size, as it comes: with the history of the problems before.
+class Engines {
+ public:
+  explicit Engines(int fallback_iterations);
+  ForceQp& of(const Sizes& sizes);
+  int max_iterations() const { return settings_.max_iterations; }
+
+ private:
+  Settings settings_;
+  std::map<std::pair<int, int>, std::unique_ptr<ForceQp>> engines_;
+};
 
 /// Problem `number`, the same on every machine: 1 to 4 contacts over 1 to 12 stages, standing or of any model, well and
 /// ill scaled (R over five, Q over four decades), feet with no arm about the centre of mass or two on one spot, mu 0.05

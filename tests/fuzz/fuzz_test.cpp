@@ -15,28 +15,12 @@ using namespace stance::force_qp::test;
 namespace {
 
 constexpr double kForceTolerance = 1e-5;  // N, where R is 1e-3 of what it is elsewhere, what a residual of 1e-6 leaves
-constexpr double kTypicalForce = 129.0;   // N
 
-/// One engine for each size, as it comes: with the history of the problems before.
-class Engines {
- public:
-  explicit Engines(int fallback_iterations) {
-    settings_.engine = QpEngine::kStructured;
-    settings_.fallback_iterations = fallback_iterations;
-  }
-  Solution solve(const Problem& problem) {
-    auto& engine = engines_[{problem.sizes.num_stages, problem.sizes.num_contacts}];
-    if (engine == nullptr) engine = make_force_qp(settings_, problem.sizes, kTypicalForce);
-    Solution solution(problem.sizes);
-    CHECK(engine->solve(problem, solution) == solution.status);
-    return solution;
-  }
-  int max_iterations() const { return settings_.max_iterations; }
-
- private:
-  Settings settings_;
-  std::map<std::pair<int, int>, std::unique_ptr<ForceQp>> engines_;
-};
+Solution solve(Engines& engines, const Problem& problem) {
+  Solution solution(problem.sizes);
+  CHECK(engines.of(problem.sizes).solve(problem, solution) == solution.status);
+  return solution;
+}
 
 }  // namespace
 
@@ -48,7 +32,7 @@ TEST_CASE("RandomProblemsAreSolvedExactlyOrRefused") {
   int active = 0;
   for (int number = 0; number < kProblems; ++number) {
     const Problem problem = random_problem(static_cast<std::uint64_t>(number));
-    const Solution solution = engines.solve(problem);
+    const Solution solution = solve(engines, problem);
     INFO("problem " << number);
     REQUIRE(fault_of(problem, solution, engines.max_iterations()) == "");
     refused += solution.status != QpStatus::kSolved;
@@ -64,7 +48,7 @@ TEST_CASE("RandomProblemsAreSolvedAsByTheReferenceSolver") {
   for (std::uint64_t number = 0; number < 300; ++number) {
     const Problem problem = random_problem(number);
     if (problem.sizes.num_stages * problem.sizes.num_contacts > 12) continue;  // it is slow
-    const Solution solution = engines.solve(problem);
+    const Solution solution = solve(engines, problem);
     if (solution.status != QpStatus::kSolved) continue;
     const std::vector<ForceVector> expected = reference_forces(problem);
     double error = 0.0;
@@ -85,10 +69,10 @@ TEST_CASE("WhateverBytesSayNothingIsCalledSolvedThatIsNot") {
   for (std::uint64_t number = 0; number < 10000; ++number) {
     const Problem problem = problem_from_bytes(random_bytes(number));
     INFO("bytes " << number);
-    const Solution solution = alone.solve(problem);
+    const Solution solution = solve(alone, problem);
     REQUIRE(fault_of(problem, solution, alone.max_iterations()) == "");
     ++seen[solution.status];
-    if (number % 10 == 0) static_cast<void>(with_osqp.solve(problem));
+    if (number % 10 == 0) static_cast<void>(solve(with_osqp, problem));
   }
   for (const QpStatus status : {QpStatus::kSolved, QpStatus::kInvalidProblem, QpStatus::kInfeasible}) {
     CHECK(seen[status] > 0);
@@ -100,7 +84,7 @@ TEST_CASE("TheFuzzersOwnCheckFindsAForceThatIsWrong") {
   int found = 0;
   for (std::uint64_t number = 0; number < 50; ++number) {
     const Problem problem = random_problem(number);
-    Solution solution = engines.solve(problem);
+    Solution solution = solve(engines, problem);
     if (solution.status != QpStatus::kSolved) continue;
     solution.forces.front()(0) += 1e-3;
     CHECK(fault_of(problem, solution, engines.max_iterations()) != "");

@@ -16,8 +16,7 @@ namespace {
 using namespace stance;
 using namespace stance::force_qp;
 
-constexpr double kAgreed = 1e-5;         // N, in any force
-constexpr double kTypicalForce = 129.0;  // N
+constexpr double kAgreed = 1e-5;  // N, in any force
 constexpr int kFallbackIterations = 50;
 
 double largest_difference(const std::vector<ForceVector>& a, const std::vector<ForceVector>& b) {
@@ -29,26 +28,11 @@ double largest_difference(const std::vector<ForceVector>& a, const std::vector<F
   return worst;
 }
 
-/// Engines that keep their history, one for each size.
-class Engines {
- public:
-  explicit Engines(int fallback_iterations) {
-    settings_.engine = QpEngine::kStructured;
-    settings_.fallback_iterations = fallback_iterations;
-  }
-  Solution solve(const Problem& problem) {
-    auto& engine = engines_[{problem.sizes.num_stages, problem.sizes.num_contacts}];
-    if (engine == nullptr) engine = make_force_qp(settings_, problem.sizes, kTypicalForce);
-    Solution solution(problem.sizes);
-    static_cast<void>(engine->solve(problem, solution));
-    return solution;
-  }
-  int max_iterations() const { return settings_.max_iterations; }
-
- private:
-  Settings settings_;
-  std::map<std::pair<int, int>, std::unique_ptr<ForceQp>> engines_;
-};
+Solution solve(test::Engines& engines, const Problem& problem) {
+  Solution solution(problem.sizes);
+  static_cast<void>(engines.of(problem.sizes).solve(problem, solution));
+  return solution;
+}
 
 struct Count {
   std::map<QpStatus, int> status;
@@ -63,7 +47,7 @@ void say(const char* what, std::uint64_t number, const std::string& fault, Count
 /// Whether DAQP, or who decides where it differs, finds the same forces.
 void compare(std::uint64_t number, const Problem& problem, const Solution& solution, Count& count) {
   bench::Sequence sequence;
-  sequence.typical_force = kTypicalForce;
+  sequence.typical_force = test::kTypicalForce;
   sequence.ticks.push_back(problem);
   const auto peer = bench::daqp().make(sequence, problem.sizes.num_stages);
   std::vector<ForceVector> forces = solution.forces;
@@ -95,8 +79,8 @@ int main(int argc, char** argv) {
   app.add_option("--first", first, "Number of the first of each")->capture_default_str();
   CLI11_PARSE(app, argc, argv);
 
-  Engines alone(0);
-  Engines with_osqp(kFallbackIterations);
+  test::Engines alone(0);
+  test::Engines with_osqp(kFallbackIterations);
   const auto report = [](const char* what, std::uint64_t total, const Count& count) {
     const auto of = [&](QpStatus status) { return count.status.contains(status) ? count.status.at(status) : 0; };
     std::printf(
@@ -110,7 +94,7 @@ int main(int argc, char** argv) {
   Count random;
   for (std::uint64_t number = first; number < first + problems; ++number) {
     const Problem problem = test::random_problem(number);
-    const Solution solution = alone.solve(problem);
+    const Solution solution = solve(alone, problem);
     ++random.status[solution.status];
     random.active += solution.iterations > 0;
     const std::string fault = test::fault_of(problem, solution, alone.max_iterations());
@@ -126,8 +110,8 @@ int main(int argc, char** argv) {
   Count edited;
   for (std::uint64_t number = first; number < first + bytes; ++number) {
     const Problem problem = test::problem_from_bytes(test::random_bytes(number));
-    for (Engines* engines : {&alone, &with_osqp}) {
-      const Solution solution = engines->solve(problem);
+    for (test::Engines* engines : {&alone, &with_osqp}) {
+      const Solution solution = solve(*engines, problem);
       // What OSQP answers is within the settings' residuals, not exact.
       if (solution.engine != QpEngine::kStructured) continue;
       if (engines == &alone) {
