@@ -112,11 +112,10 @@ double Interception::bearing(const Vector3& p_A) const noexcept {
   return std::atan2(p_A.y(), p_A.x()) - std::atan2(-arm_.d2, along);
 }
 
-double Interception::facing(const BallState& ball, double offset) const noexcept {
+double Interception::in_plane(const BallState& ball) const noexcept {
   const double t1 = bearing(ball.p_A);
   const double v_r = std::cos(t1) * ball.v_A.x() + std::sin(t1) * ball.v_A.y();
-  const double in_plane = std::hypot(v_r, ball.v_A.z()) / std::max(ball.v_A.norm(), 1e-9);
-  return std::acos(std::min(std::cos(offset) * in_plane, 1.0));
+  return std::hypot(v_r, ball.v_A.z()) / std::max(ball.v_A.norm(), 1e-9);
 }
 
 /// Closes the wrist's circle where the ball is barely out of reach. Returns by how much [m], infinity where that is too
@@ -175,8 +174,9 @@ const InterceptionPlan& Interception::update(double now, const BallState& ball, 
     if (then.p_A.z() < config_.min_height || from_shoulder.norm() > farthest_) continue;
     const double left = time - now;
     const double time_change = plan_.exists() ? config_.time_change_cost * std::abs(time - plan_.time) : 0.0;
+    const double share_in_plane = in_plane(then);
     for (const double offset : config_.pitch_offsets) {
-      const double angle = facing(then, offset);
+      const double angle = std::acos(std::min(std::cos(offset) * share_in_plane, 1.0));
       const double known = config_.facing_cost * angle * angle +
                            config_.turned_away_cost * std::max(0.0, angle - config_.max_facing) + time_change;
       if (known >= least) continue;

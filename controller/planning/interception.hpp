@@ -100,8 +100,8 @@ class Interception {
   void follow(double now, BallState ball, const JointMotion& motion) noexcept;
   /// rad, t1 of an arm whose plane holds `p_A`, on its side.
   double bearing(const Vector3& p_A) const noexcept;
-  /// rad, between the axis of a cup that meets `ball` at `offset` and the ball's velocity reversed.
-  double facing(const BallState& ball, double offset) const noexcept;
+  /// Of the ball's speed, what lies in the arm's plane: the cosine of the angle to it.
+  double in_plane(const BallState& ball) const noexcept;
   /// Calls `take(q, short_of)` for each posture with the cup at `ball`'s place, its axis at `offset`.
   template <typename Take>
   void postures(const BallState& ball, double offset, const Take& take) const noexcept;
