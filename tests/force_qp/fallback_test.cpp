@@ -44,7 +44,7 @@ class Liar final : public StructuredSolver {
   void refine() noexcept override {}
   void take_ahead() noexcept override { honest_->take_ahead(); }
   int iterations() const noexcept override { return honest_->iterations(); }
-  bool ended_by_revision() const noexcept override { return honest_->ended_by_revision(); }
+  bool holds() const noexcept override { return honest_->holds(); }
   void forces(std::vector<ForceVector>& out) const noexcept override {
     honest_->forces(out);
     out.back()(2) += error_;

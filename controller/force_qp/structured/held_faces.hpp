@@ -1,21 +1,33 @@
 #pragma once
-// Whole sets of active faces at once, for the path of simd.hpp that is included before it. The mathematics stands in
+// The minimiser within held faces, for the path of simd.hpp that is included before it. The mathematics stands in
 // structured.hpp; names are its.
-#include "controller/force_qp/structured/riccati.hpp"
+#include "controller/force_qp/structured/columns.hpp"
 
 namespace stance::force_qp::structured::STANCE_ISA {
 
-// From how many guessed constraints on sets are revised as a whole. A revision costs what the horizon costs, the active
-// set the square of its constraints: they are even at about 80 (measured over 20 and 50 stages of two feet). On one
-// foot at a time revisions cycle too often to pay.
-constexpr int kManyGuesses = 80;
-constexpr int kBoldRevisions = 6;  // after which only some contacts follow what multipliers and violations say
-constexpr int kMaxRevisions = 40;  // after which the active set takes over: about what it costs itself by then
+constexpr int kManyNegative = 48;  // contacts with negative multipliers: so many are let go at once
+
+/// Faces as they can be held. Opposite ones that are both active meet at fz = 0: one of them and the lower bound can
+/// pull back as they do, -d = C'y, and nothing is lost where the bound is higher.
+inline std::uint8_t holdable(unsigned faces, double dx, double dy) noexcept {
+  const bool x_meet = (faces & 3U) == 3U;
+  const bool y_meet = (faces >> 2 & 3U) == 3U;
+  if (x_meet) faces ^= dx > 0.0 ? 1U : 2U;
+  if (y_meet) faces ^= dy > 0.0 ? 4U : 8U;
+  if (x_meet || y_meet) faces = (faces & ~16U) | 32U;
+  if ((faces >> 4 & 3U) == 3U) faces ^= 16U;
+  return static_cast<std::uint8_t>(faces);
+}
+
+/// fz = 0 is held, with the sides whose multipliers a gradient makes positive.
+inline std::uint8_t apex_with_sides(double dx, double dy) noexcept {
+  return static_cast<std::uint8_t>((dx > 0.0 ? 2 : 1) | (dy > 0.0 ? 8 : 4) | 32);
+}
 
 /// Moves the forces of contacts with held faces onto these.
 template <int NC>
 void lie_on_faces(Workspace<NC>& w) noexcept {
-  double* x = w.forces;
+  double* x = w.state;
   double* y = x + w.padded_rows;
   double* z = y + w.padded_rows;
   for (int row = 0; row < w.rows; ++row) {
@@ -27,109 +39,52 @@ void lie_on_faces(Workspace<NC>& w) noexcept {
   }
 }
 
-/// Whether contact `row` may change in this revision: all may in the first ones, then three of four, others each time
-/// and the same in every run. Revisions that move all at once can go round in a circle for ever.
-inline bool may_change(int row, int revision) noexcept {
-  if (revision < kBoldRevisions) return true;
-  std::uint32_t h = static_cast<std::uint32_t>(row) * 2654435761U + static_cast<std::uint32_t>(revision) * 2246822519U;
-  h = (h ^ (h >> 15)) * 2246822519U;
-  return ((h ^ (h >> 13)) & 3U) != 0;
+/// Multipliers of the faces that a contact holds, from its gradient.
+inline void held_multipliers(const Held& h, double friction, int stride, const double* d, double (&y)[3]) noexcept {
+  y[0] = -h.x * d[0];
+  y[1] = -h.y * d[stride];
+  y[2] = h.z * (friction * (y[0] + y[1]) - d[2 * stride]);
 }
 
-/// The faces that contact `row` of stage `s` holds next: those held whose multipliers are not negative, and those that
-/// its force violates.
+/// Of what is held, what the gradient in `state` does not push away, into `next_held`. Returns how many contacts let
+/// go. At the apex all sides hold: there fz alone may be let go, and the sides that it leaves are named.
 template <int NC>
-unsigned next_faces(const Workspace<NC>& w, const Stage<NC>& s, int row) noexcept {
-  const double* f = w.forces + row;
-  const double* d = w.gradient + row;
-  const int slot = row - s.first_row;
-  const double* R = s.R[slot / 2].v + 4 * (slot % 2);
-  const double fx = f[0], fy = f[w.padded_rows], fz = f[2 * w.padded_rows];
-  const double dx = d[0], dy = d[w.padded_rows], dz = d[2 * w.padded_rows];
-  const double least = R[0] < R[1] ? (R[0] < R[2] ? R[0] : R[2]) : (R[1] < R[2] ? R[1] : R[2]);
-  const double negative = -w.tolerance * least;
-
-  const Held h(w.held[row], w.fz_min[row]);
-  // At the apex every side face holds; those that -d pushes against carry the multipliers. One that carries none to
-  // speak of stays as it is.
-  const auto side_of = [&](int held, double gradient) noexcept {
-    if (!h.apex || (held != 0 && -held * gradient >= negative)) return held;
-    return gradient > 0.0 ? -1 : 1;
-  };
-  const int side_x = side_of(h.x, dx);
-  const int side_y = side_of(h.y, dy);
-  const double multiplier_x = -side_x * dx;
-  const double multiplier_y = -side_y * dy;
-  const double multiplier_z = h.z * (w.friction * (multiplier_x + multiplier_y) - dz);
-  const double room = w.friction * fz + w.tolerance;
-  const auto side = [&](int held, double multiplier, double component) noexcept -> unsigned {
-    if (held != 0) return multiplier < negative ? 0U : held > 0 ? 1U : 2U;
-    return component > room ? 1U : -component > room ? 2U : 0U;
-  };
-  unsigned z = 0;
-  if (h.z != 0) {
-    z = multiplier_z < negative ? 0U : h.z > 0 ? 1U : 2U;
-  } else {
-    z = fz > w.fz_max[row] + w.tolerance ? 1U : fz < w.fz_min[row] - w.tolerance ? 2U : 0U;
-  }
-  return side(side_x, multiplier_x, fx) | side(side_y, multiplier_y, fy) << 2 | z << 4;
-}
-
-/// Revises the faces that are held; returns the last stage that changed, -1 where none is to.
-template <int NC>
-int revise(Workspace<NC>& w, int revision) noexcept {
-  int first = -1;
-  int last = -1;
-  for (int k = 0; k < w.num_stages; ++k) {
-    const Stage<NC>& s = w.stages[k];
-    for (int row = s.first_row; row < s.first_row + s.slots; ++row) {
-      if (!(w.fz_max[row] > 0.0)) continue;
-      const unsigned next = next_faces(w, s, row);
-      if (next == w.held[row]) continue;
-      if (first >= 0 && !may_change(row, revision)) continue;
-      first = first < 0 ? k : first;
-      last = k;
-      w.held[row] = static_cast<std::uint8_t>(next);
+int keep_positive(Workspace<NC>& w) noexcept {
+  int changes = 0;
+  for (int row = 0; row < w.rows; ++row) {
+    w.next_held[row] = w.held[row];
+    if (w.held[row] == 0) continue;
+    const double* d = w.state + 3 * w.padded_rows + row;
+    if (Held(w.held[row], w.fz_min[row]).apex) w.held[row] = apex_with_sides(d[0], d[w.padded_rows]);
+    const Held h(w.held[row], w.fz_min[row]);
+    double y[3];
+    held_multipliers(h, w.friction, w.padded_rows, d, y);
+    unsigned kept = w.held[row];
+    for (int axis = 0; axis < 3; ++axis) {
+      if (y[axis] < 0.0) kept &= ~(3U << (2 * axis));
     }
+    w.next_held[row] = static_cast<std::uint8_t>(kept);
+    changes += w.next_held[row] != w.held[row];
   }
-  return last;
+  return changes;
 }
 
-/// Holds the constraints to begin with.
+/// Holds `next_held`: the factor, and the state of the minimiser within them from the forces in `state`. False where
+/// the factor cannot be had.
 template <int NC>
-void hold_guesses(Workspace<NC>& w) noexcept {
-  for (int row = 0; row < w.padded_rows; ++row) w.held[row] = 0;
-  for (int i = 0; i < w.num_guesses; ++i) {
-    std::uint8_t& held = w.held[w.guesses[i] / kFaces];
-    held = static_cast<std::uint8_t>(held | 1U << (w.guesses[i] % kFaces));
+bool hold(Workspace<NC>& w) noexcept {
+  int last = w.held_factor_stands ? -1 : w.num_stages - 1;
+  for (int row = 0; row < w.rows; ++row) {
+    if (w.next_held[row] == w.held[row]) continue;
+    w.held[row] = w.next_held[row];
+    last = w.row_stage[row] > last ? w.row_stage[row] : last;
   }
-}
-
-/// The solution from the faces in `held`, by revisions of the whole set; false where they do not end.
-template <int NC>
-bool solve_held(Workspace<NC>& w) noexcept {
-  for (int k = 0; k < w.num_stages; ++k) {
-    const Stage<NC>& s = w.stages[k];
-    with_slots(s, [&]<int M>() noexcept {
-      Vec f[Stage<NC>::kPairs];
-      for (int pair = 0; 2 * pair < M; ++pair) f[pair] = load(s.f_ref[pair]);
-      scatter<M>(f, w.forces, w.padded_rows, s.first_row);
-    });
-  }
-  int last = w.num_stages - 1;
-  for (int revision = 0; revision < kMaxRevisions && w.iterations < w.max_iterations; ++revision) {
-    lie_on_faces(w);
-    if (!factor_held(w, last)) return false;
-    sweep<NC>(w, w.held_gains, w.forces, nullptr, w.forces);
-    gradient_at<NC>(w, w.forces, w.gradient);
-    last = revise(w, revision);
-    if (last < 0) {
-      w.ends_held = true;
-      return true;
-    }
-    ++w.iterations;
-  }
-  return false;
+  w.held_factor_stands = factor_held(w, last);
+  if (!w.held_factor_stands) return false;
+  lie_on_faces(w);
+  sweep<true>(w, w.state, nullptr, w.state);
+  gradient_at<NC>(w, w.state, w.state + 3 * w.padded_rows);
+  return true;
 }
 
 }  // namespace stance::force_qp::structured::STANCE_ISA

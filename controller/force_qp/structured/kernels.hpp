@@ -1,178 +1,21 @@
 #pragma once
-// Columns and active set of the structured engine, for the path of simd.hpp that is included before it. The mathematics
-// stands in structured.hpp; names are its.
+// The active set of the structured engine, for the path of simd.hpp that is included before it. The mathematics stands
+// in structured.hpp; names are its.
 #include "controller/force_qp/structured/held_faces.hpp"
 
 namespace stance::force_qp::structured::STANCE_ISA {
 
-constexpr int kMaxPasses = 6;            // of appending constraints in blocks
-constexpr int kMaxBlock = 16;            // constraints in one block
-constexpr int kPerContact = 3;           // active constraints of a contact, at most, when appended in blocks
+constexpr int kMaxBlock = 32;     // constraints in one block
+constexpr int kPerContact = 3;    // active constraints of a contact, at most, when appended in blocks
+constexpr int kFewGuesses = 16;   // to begin with: more are held, where columns are to be made ..
+constexpr int kManyGuesses = 60;  // .. and where they are kept
+constexpr int kManyChanges = 48;  // of a set that is held, before another is
+constexpr int kMaxHolds = 30;
+constexpr int kColumnRoom = 64;          // of columns that a step may ask for
 constexpr double kDependent = 1e-11;     // of a constraint's own curvature: what is left of it below this is nothing
 constexpr double kNoMultiplier = 1e-13;  // change of a multiplier that counts as none
+constexpr double kNever = 1e300;         // a step that no multiplier stops
 constexpr double kExactlyActive = 1e-4;  // of the tolerance: an active constraint is met to this, or refined
-
-// ---- Columns ------------------------------------------------------------------------------------------------------
-
-/// c_i of constraint i at its own contact.
-inline void normal(int i, double friction, double (&c)[3]) noexcept {
-  const int face = i % kFaces;
-  c[0] = face == 0 ? 1.0 : face == 1 ? -1.0 : 0.0;
-  c[1] = face == 2 ? 1.0 : face == 3 ? -1.0 : 0.0;
-  c[2] = face < 4 ? -friction : face == 4 ? 1.0 : -1.0;
-}
-
-/// H^-1 c for up to eight constraints at once: a sweep with the constraints in the lanes.
-template <int NC>
-void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* out) noexcept {
-  const int N = w.num_stages;
-  const int padded = w.padded_rows;
-  int last = 0;
-  int stage_of[8];
-  for (int j = 0; j < count; ++j) {
-    stage_of[j] = w.row_stage[ids[j] / kFaces];
-    last = stage_of[j] > last ? stage_of[j] : last;
-  }
-
-  Vec p[12];
-  for (Vec& a : p) a = zeros();
-  for (int k = last; k >= 0; --k) {
-    const Stage<NC>& s = w.stages[k];
-    const Gain<NC>& gain = w.gains[k];
-    bool begins = false;
-    for (int j = 0; j < count; ++j) begins = begins || stage_of[j] == k;
-    with_slots(s, [&]<int M>() noexcept {
-      constexpr int U = 3 * M;
-      Vec su[U];
-      for (int c = 0; c < U; ++c) {
-        Vec a = entry(s.B[c], 0) * p[6];
-        for (int i = 1; i < 6; ++i) a = add_product(a, entry(s.B[c], i), p[6 + i]);
-        su[c] = a;
-      }
-      if (begins) {
-        Lanes t[U] = {};
-        for (int j = 0; j < count; ++j) {
-          if (stage_of[j] != k) continue;
-          double n[3];
-          normal(ids[j], w.friction, n);
-          const int slot = ids[j] / kFaces - s.first_row;
-          for (int d = 0; d < 3; ++d) t[3 * slot + d].v[j] = n[d];
-        }
-        for (int c = 0; c < U; ++c) su[c] = su[c] + load(t[c]);
-      }
-      for (int c = 0; c < U; ++c) {
-        Vec a = zeros();
-        for (int e = 0; e < U; ++e) a = add_product(a, entry(gain.Quu_inverse[c / 6][e], c % 6), su[e]);
-        store(w.eight_feedforward[k * 3 * NC + c], a);
-      }
-      if (k == 0) return;
-      Vec h[12];
-      for (int i = 0; i < 6; ++i) {
-        const int block = i / 3 * 3;
-        h[i] = p[i];
-        Vec a = p[6 + i];
-        for (int j = 0; j < 3; ++j) a = add_product(a, all(s.D[i - block].v[lane_of(block + j)]), p[block + j]);
-        h[6 + i] = a;
-      }
-      if (s.coupled) {
-        for (int j = 0; j < 3; ++j) {
-          for (int i = 0; i < 3; ++i) h[3 + j] = add_product(h[3 + j], all(s.C[j].v[i]), p[6 + i]);
-        }
-      }
-      for (int i = 0; i < 6; ++i) {
-        for (int c = 0; c < U; ++c) {
-          h[i] = subtract_product(h[i], entry(gain.K_pose[c], i), su[c]);
-          h[6 + i] = subtract_product(h[6 + i], entry(gain.K_rate[c], i), su[c]);
-        }
-      }
-      for (int i = 0; i < 12; ++i) p[i] = h[i];
-    });
-  }
-
-  Vec x[12];
-  for (Vec& a : x) a = zeros();
-  for (int k = 0; k < N; ++k) {
-    const Stage<NC>& s = w.stages[k];
-    const Gain<NC>& gain = w.gains[k];
-    with_slots(s, [&]<int M>() noexcept {
-      constexpr int U = 3 * M;
-      Vec f[U];
-      for (int c = 0; c < U; ++c) {
-        Vec a = k <= last ? load(w.eight_feedforward[k * 3 * NC + c]) : zeros();
-        Vec b = zeros();
-        for (int i = 0; i < 6; ++i) {
-          a = subtract_product(a, entry(gain.K_pose[c], i), x[i]);
-          b = add_product(b, entry(gain.K_rate[c], i), x[6 + i]);
-        }
-        f[c] = a - b;
-        store(w.eight_forces[c % 3 * padded + s.first_row + c / 3], f[c]);
-      }
-      Vec y[12];
-      for (int i = 0; i < 6; ++i) {
-        const int block = i / 3 * 3;
-        Vec a = x[i];
-        for (int j = 0; j < 3; ++j) a = add_product(a, all(s.D[j].v[lane_of(i)]), x[6 + block + j]);
-        y[i] = a;
-        Vec b = x[6 + i];
-        for (int c = 0; c < U; ++c) b = add_product(b, entry(s.B[c], i), f[c]);
-        y[6 + i] = b;
-      }
-      if (s.coupled) {
-        for (int i = 0; i < 3; ++i) {
-          for (int j = 0; j < 3; ++j) y[6 + i] = add_product(y[6 + i], all(s.C[j].v[i]), x[3 + j]);
-        }
-      }
-      for (int i = 0; i < 12; ++i) x[i] = y[i];
-    });
-  }
-  for (int d = 0; d < 3; ++d) {
-    for (int row = w.rows; row < padded; ++row) store(w.eight_forces[d * padded + row], zeros());
-  }
-
-  for (int at = 0; at < 3 * padded; at += 8) {
-    Vec t[8];
-    for (int i = 0; i < 8; ++i) t[i] = load(w.eight_forces[at + i]);
-    transpose(t);
-    for (int j = 0; j < count; ++j) store(out[j] + at, t[j]);
-  }
-}
-
-/// Takes the columns of `ids` that there are not yet, eight at a time. False where there is no room for all.
-template <int NC>
-bool take_columns(Workspace<NC>& w, const int* ids, int count) noexcept {
-  int batch[8];
-  double* out[8];
-  int pending = 0;
-  bool room = true;
-  for (int i = 0; i < count && room; ++i) {
-    if (w.column_of[ids[i]] >= 0) continue;
-    room = w.num_columns < w.max_columns;
-    if (!room) break;
-    batch[pending] = ids[i];
-    out[pending++] = w.columns + static_cast<std::int64_t>(w.num_columns) * 3 * w.padded_rows;
-    w.column_of[ids[i]] = w.num_columns;
-    w.column_constraint[w.num_columns++] = ids[i];
-    if (pending == 8) {
-      eight_columns(w, batch, pending, out);
-      pending = 0;
-    }
-  }
-  if (pending > 0) eight_columns(w, batch, pending, out);
-  return room;
-}
-
-template <int NC>
-void take_ahead(Workspace<NC>& w) noexcept {
-  int ids[8];
-  int count = 0;
-  const int room = w.max_columns - w.num_columns;
-  for (; w.ahead < kFaces * w.rows && count < 8 && count < room; ++w.ahead) {
-    const int row = w.ahead / kFaces;
-    const bool can_bind = w.fz_max[row] > 0.0 && (w.ahead % kFaces < kFaces - 1 || w.fz_min[row] > 0.0);
-    if (can_bind && w.column_of[w.ahead] < 0) ids[count++] = w.ahead;
-  }
-  take_columns(w, ids, count);
-}
 
 // ---- Active set ---------------------------------------------------------------------------------------------------
 
@@ -184,89 +27,208 @@ class ActiveSet {
 
   Outcome solve() noexcept {
     w.iterations = 0;
-    w.ends_held = false;
     clear();
-    if (w.num_guesses > kManyGuesses && w.rows >= 2 * w.num_stages) {
-      hold_guesses(w);
-      if (solve_held<NC>(w)) return Outcome::kSolved;
+    w.holds = w.num_guesses > (w.free_columns.num == 0 ? kFewGuesses : kManyGuesses);
+    holds_ = 0;
+    if (w.holds) {
+      take_guesses();
+      if (!begin_held()) return Outcome::kSingular;
+    } else {
+      if (!w.factor_stands && !factor(w)) return Outcome::kSingular;
+      sweep<false>(w, nullptr, nullptr, w.start);
+      begin_with_guesses();
     }
-    sweep<NC>(w, w.gains, nullptr, nullptr, w.free_forces);
-    begin_with_guesses();
-    combine();
-    int passes = 0;
     for (;;) {
+      Outcome outcome = ascend();
+      if (outcome != Outcome::kSolved) return outcome;
+      if (is_crowded()) {
+        take_active();
+        if (!begin_held()) return Outcome::kSingular;
+        continue;
+      }
       const double worst = scan();
       if (!(worst > w.tolerance)) break;  // a number that is none is caught by the independent check
       if (w.iterations == w.max_iterations) return Outcome::kOutOfBudget;
       ++w.iterations;
-      if (passes < kMaxPasses) {
-        ++passes;
-        if (append_block()) {
-          settle();
-          combine();
-          continue;
-        }
-      }
-      const Outcome outcome = step(most_violated(worst), worst);
+      if (!append_block(worst)) outcome = step(most_violated(worst), worst);
       if (outcome != Outcome::kSolved) return outcome;
-      combine();
     }
     correct_rounding();
+    name_multipliers();
     return Outcome::kSolved;
   }
 
   void refine() noexcept {
-    if (w.ends_held) {
-      sweep<NC>(w, w.held_gains, w.forces, nullptr, w.forces);
-      return;
-    }
-    // pull = C_A' y, in the place of the violations' candidates' forces
-    double* pull = w.free_forces;
+    // pull = C_A' y
+    double* pull = w.way;
     for (int i = 0; i < 3 * w.padded_rows; ++i) pull[i] = 0.0;
     for (int a = 0; a < w.active; ++a) {
+      if (w.sign[a] < 0.0) continue;
       const Constraint& c = w.constraint[a];
-      pull[c.side_at] += c.side * w.multiplier[a];
-      pull[c.up_at] += c.up * w.multiplier[a];
+      for (int d = 0; d < 3; ++d) pull[c.at + d * w.padded_rows] += c.n[d] * w.multiplier[a];
     }
-    sweep<NC>(w, w.gains, w.forces, pull, w.forces);
+    const int forces = 3 * w.padded_rows;
+    (w.holds ? sweep<true, NC> : sweep<false, NC>)(w, w.state, pull, w.state);
+    if (w.holds) {
+      gradient_at<NC>(w, w.state, w.state + forces);
+      for (int i = 0; i < forces; ++i) w.state[forces + i] += pull[i];
+    }
     correct_rounding();
   }
 
  private:
+  /// Constraint `id` as a function of the forces; of the gradient, its multiplier, where it is held.
   Constraint constraint_of(int id) const noexcept {
-    static constexpr double kSide[kFaces] = {1.0, -1.0, 1.0, -1.0, 0.0, 0.0};
     const int row = id / kFaces;
     const int face = id % kFaces;
     Constraint c;
     c.id = id;
-    c.side = kSide[face];
-    c.side_at = (face == 2 || face == 3 ? w.padded_rows : 0) + row;
-    c.up = face < 4 ? -w.friction : face == 4 ? 1.0 : -1.0;
-    c.up_at = 2 * w.padded_rows + row;
-    c.bound = face < 4 ? 0.0 : face == 4 ? w.fz_max[row] : -w.fz_min[row];
+    if (is_held(w, id)) {
+      way_off(id, Held(w.held[row], w.fz_min[row]), w.friction, c.n);
+      for (double& n : c.n) n = -n;
+      c.at = 3 * w.padded_rows + row;
+      c.bound = 0.0;
+    } else {
+      normal(id, w.friction, c.n);
+      c.at = row;
+      c.bound = face < 4 ? 0.0 : face == 4 ? w.fz_max[row] : -w.fz_min[row];
+    }
     return c;
   }
-  /// c v
-  static double along(const Constraint& c, const double* v) noexcept {
-    return c.side * v[c.side_at] + c.up * v[c.up_at];
+  /// n' of it
+  double along(const Constraint& c, const double* v) const noexcept {
+    v += c.at;
+    return (c.n[0] * v[0] + c.n[1] * v[w.padded_rows]) + c.n[2] * v[2 * w.padded_rows];
   }
   const double* column_of(int i) const noexcept {
-    return w.columns + static_cast<std::int64_t>(w.column_of[i]) * 3 * w.padded_rows;
+    const Columns& columns = columns_of(w);
+    return columns.values + static_cast<std::int64_t>(columns.of[i]) * length();
   }
+  int length() const noexcept { return length_of_state(w); }
   double* row_of_L_inverse(int a) noexcept { return w.L_inverse + static_cast<std::int64_t>(a) * w.stride; }
   int blocks() const noexcept { return (w.active + 7) / 8; }
 
-  void clear() noexcept {
+  void clear_changes() noexcept {
     for (int a = 0; a < w.active; ++a) {
       double* row = row_of_L_inverse(a);
       for (int b = 0; b <= a / 8; ++b) store(row + 8 * b, zeros());
-      w.is_active[w.constraint[a].id] = 0;
-      w.active_in_row[w.constraint[a].id / kFaces] = 0;
     }
     w.active = 0;
   }
+  void clear() noexcept {
+    for (int a = 0; a < w.active; ++a) set_status(w.constraint[a].id, kIdle);
+    clear_changes();
+    for (int row = 0; row < w.held_rows; ++row) {
+      for (int face = 0; face < kFaces; ++face) w.status[kFaces * row + face] = kIdle;
+      w.active_in_row[row] = 0;
+    }
+    w.held_rows = 0;
+  }
+  void set_status(int id, Status status) noexcept {
+    w.active_in_row[id / kFaces] =
+        static_cast<std::int8_t>(w.active_in_row[id / kFaces] + (status == kActive) - (w.status[id] == kActive));
+    w.status[id] = status;
+    if (is_held(w, id)) w.still[id % kFaces / 2 * w.padded_rows + id / kFaces] = status == kActive ? 1.0 : 0.0;
+  }
 
-  /// direction = L^-T L^-1 right, right padded with zeros; returns |L^-1 right|^2.
+  // ---- Held faces
+
+  /// What to hold, and the gradients that its multipliers come from, as the last solution had them.
+  void take_guesses() noexcept {
+    for (int row = 0; row < w.padded_rows; ++row) w.next_held[row] = 0;
+    for (int i = 0; i < 3 * w.padded_rows; ++i) w.before[i] = 0.0;
+    for (int i = 0; i < w.num_guesses; ++i) {
+      std::uint8_t& next = w.next_held[w.guesses[i] / kFaces];
+      next = static_cast<std::uint8_t>(next | 1U << (w.guesses[i] % kFaces));
+      pull_back(w.guesses[i], w.guess_multiplier[i]);
+    }
+    for (int row = 0; row < w.rows; ++row) {
+      w.next_held[row] = holdable(w.next_held[row], w.before[row], w.before[w.padded_rows + row]);
+    }
+    for (int k = 0; k < w.num_stages; ++k) {
+      const Stage<NC>& s = w.stages[k];
+      with_slots(s, [&]<int M>() noexcept {
+        Vec f[Stage<NC>::kPairs];
+        for (int pair = 0; 2 * pair < M; ++pair) f[pair] = load(s.f_ref[pair]);
+        scatter<M>(f, w.state, w.padded_rows, s.first_row);
+      });
+    }
+  }
+  /// The same of what is active now.
+  void take_active() noexcept {
+    const int forces = 3 * w.padded_rows;
+    for (int i = 0; i < forces; ++i) w.before[i] = w.holds ? w.state[forces + i] : 0.0;
+    for (int a = 0; a < w.active; ++a) {
+      if (w.sign[a] > 0.0) pull_back(w.constraint[a].id, w.multiplier[a]);
+    }
+    for (int row = 0; row < w.padded_rows; ++row) {
+      unsigned faces = 0;
+      for (int face = 0; face < kFaces; ++face) {
+        faces |= static_cast<unsigned>(w.status[kFaces * row + face] == kActive) << face;
+      }
+      w.next_held[row] = holdable(faces, w.before[row], w.before[w.padded_rows + row]);
+    }
+  }
+  /// before -= c_i y
+  void pull_back(int i, double multiplier) noexcept {
+    double n[3];
+    normal(i, w.friction, n);
+    for (int d = 0; d < 3; ++d) w.before[i / kFaces + d * w.padded_rows] -= n[d] * multiplier;
+  }
+
+  /// Whether so much has changed that it pays to hold the set as it is and begin again.
+  bool is_crowded() const noexcept {
+    if (holds_ == kMaxHolds) return false;
+    if (lost_) return true;
+    if (!w.holds) return w.active > kManyGuesses;
+    return w.active > kManyChanges || w.held_columns.num + kColumnRoom > w.held_columns.max;
+  }
+
+  /// Holds `next_held` instead of what is held or active now: the minimiser within it in `start`, and in `state` the
+  /// multipliers of `before`, as far as they are positive.
+  bool begin_held() noexcept {
+    ++holds_;
+    lost_ = false;
+    clear();
+    w.holds = true;
+    w.held_rows = w.rows;
+    forget(w.held_columns);
+    if (!hold(w)) return false;
+    // A guess that is far off
+    while (holds_ == 1 && keep_positive(w) > kManyNegative && w.iterations < w.max_iterations) {
+      ++w.iterations;
+      if (!hold(w)) return false;
+    }
+    for (int i = 0; i < length(); i += 8) store(w.start + i, load(w.state + i));
+    for (int i = 0; i < 3 * w.padded_rows; i += 8) {
+      store(w.side + i, zeros());
+      store(w.still + i, zeros());
+    }
+    for (int row = 0; row < w.rows; ++row) {
+      if (w.held[row] == 0) continue;
+      const double* before = w.before + row;
+      if (Held(w.held[row], w.fz_min[row]).apex) {
+        w.held[row] = apex_with_sides(before[0], before[w.padded_rows]);
+      }
+      const Held h(w.held[row], w.fz_min[row]);
+      const int sides[3] = {h.x, h.y, h.z};
+      double y[3];
+      held_multipliers(h, w.friction, w.padded_rows, before, y);
+      for (int axis = 0; axis < 3; ++axis) {
+        if (!(y[axis] > 0.0)) y[axis] = 0.0;
+        if (sides[axis] == 0) continue;
+        w.side[axis * w.padded_rows + row] = sides[axis];
+        set_status(kFaces * row + held_face(h, axis), kActive);
+      }
+      double* d = w.state + 3 * w.padded_rows + row;
+      d[0] = -h.x * y[0];
+      d[w.padded_rows] = -h.y * y[1];
+      d[2 * w.padded_rows] = w.friction * (y[0] + y[1]) - h.z * y[2];
+    }
+    return true;
+  }
+
+  /// direction = L^-T S L^-1 right, right padded with zeros; returns right' direction.
   double solve_small() noexcept {
     const int n = blocks();
     for (int a = w.active; a < 8 * n; ++a) w.right[a] = 0.0;
@@ -280,8 +242,9 @@ class ActiveSet {
         for (int i = 0; i < 8; ++i) partial[i] = add_product(partial[i], load(row_of_L_inverse(8 * b + i) + 8 * c), r);
       }
       const Vec l = sums(partial);
-      store(w.half + 8 * b, l);
-      squares = add_product(squares, l, l);
+      const Vec signed_l = l * load(w.sign + 8 * b);
+      store(w.half + 8 * b, signed_l);
+      squares = add_product(squares, signed_l, l);
     }
     for (int b = 0; b < n; ++b) {
       Vec partial[4] = {zeros(), zeros(), zeros(), zeros()};
@@ -295,13 +258,13 @@ class ActiveSet {
     return sum(squares);
   }
 
-  /// direction = M^-1 C_A v; returns the curvature c v that the active set leaves to constraint c, v = H^-1 c.
-  double curvature_left(const Constraint& c, const double* v) noexcept {
+  /// direction = M^-1 C_A v; returns the pivot that the active set leaves to constraint c with column v.
+  double pivot_left(const Constraint& c, const double* v) noexcept {
     for (int a = 0; a < w.active; ++a) w.right[a] = along(w.constraint[a], v);
     return along(c, v) - solve_small();
   }
 
-  /// Appends constraint c; `left` and direction as curvature_left gave them.
+  /// Appends constraint c; |left| and direction as pivot_left gave them.
   void append(const Constraint& c, const double* v, double left) noexcept {
     const int k = w.active;
     double* row = row_of_L_inverse(k);
@@ -309,11 +272,13 @@ class ActiveSet {
     for (int a = 0; a < k; ++a) row[a] = -w.direction[a] * scale;
     row[k] = scale;
     for (int a = k + 1; a < 8 * (k / 8 + 1); ++a) row[a] = 0.0;
+    const bool released = is_held(w, c.id);
     w.constraint[k] = c;
+    w.sign[k] = released ? -1.0 : 1.0;
     w.column[k] = v;
-    w.excess[k] = along(c, w.free_forces) - c.bound;
-    w.is_active[c.id] = 1;
-    ++w.active_in_row[c.id / kFaces];
+    w.excess[k] = along(c, w.start) - c.bound;
+    w.multiplier[k] = 0.0;
+    set_status(c.id, released ? kReleased : kActive);
     ++w.active;
   }
 
@@ -322,8 +287,9 @@ class ActiveSet {
     if (w.active == w.max_active) return false;
     const double* v = column_of(i);
     const Constraint c = constraint_of(i);
-    const double left = curvature_left(c, v);
-    if (!(left > kDependent * along(c, v))) return false;
+    const double sign = is_held(w, i) ? -1.0 : 1.0;
+    const double left = sign * pivot_left(c, v);
+    if (!(left > kDependent * (sign * along(c, v)))) return false;
     append(c, v, left);
     return true;
   }
@@ -332,13 +298,14 @@ class ActiveSet {
   /// goes with it.
   void drop(int j) noexcept {
     const int k = w.active;
-    w.is_active[w.constraint[j].id] = 0;
-    --w.active_in_row[w.constraint[j].id / kFaces];
+    set_status(w.constraint[j].id, w.sign[j] < 0.0 ? kActive : kIdle);
+    const double sign = w.sign[j];
     // half: column j from row j on; right: the norms of its first entries
     double squares = 0.0;
     for (int i = j; i < k; ++i) {
       const double x = row_of_L_inverse(i)[j];
-      squares += x * x;
+      squares += sign * w.sign[i] * (x * x);
+      lost_ = lost_ || !(squares > 0.0);
       w.half[i] = x;
       w.right[i] = __builtin_sqrt(squares);
     }
@@ -353,13 +320,14 @@ class ActiveSet {
       double* b = row_of_L_inverse(i + 1);
       const Vec cosine = all(w.direction[i]);
       const Vec sine = all(w.half[i]);
+      const Vec turned = all(sign * w.sign[i + 1] * w.direction[i]);
       const int n = (i + 1) / 8 + 1;
       if (n > i / 8 + 1) store(a + 8 * (n - 1), zeros());
       for (int q = 0; q < n; ++q) {
         const Vec x = load(a + 8 * q);
         const Vec y = load(b + 8 * q);
         store(a + 8 * q, cosine * x - sine * y);
-        store(b + 8 * q, sine * x + cosine * y);
+        store(b + 8 * q, sine * x + turned * y);
       }
       for (int q = j; q <= i; ++q) a[q] = a[q + 1];  // column j is gone
       a[i + 1] = 0.0;
@@ -369,69 +337,119 @@ class ActiveSet {
       w.constraint[i] = w.constraint[i + 1];
       w.multiplier[i] = w.multiplier[i + 1];
       w.excess[i] = w.excess[i + 1];
+      w.sign[i] = w.sign[i + 1];
       w.column[i] = w.column[i + 1];
     }
     --w.active;
   }
 
-  /// Multipliers of the active set; drops the negative ones until there are none.
-  void settle() noexcept {
-    for (bool dropped = true; dropped && w.active > 0;) {
+  /// From multipliers none of which is negative to those of the active set, or of what is left of it: what reaches zero
+  /// on the way is dropped. Ends early where the set is crowded.
+  Outcome ascend() noexcept {
+    for (;;) {
+      if (is_crowded()) return Outcome::kSolved;
+      if (lost_) return Outcome::kSingular;
       for (int a = 0; a < w.active; ++a) w.right[a] = w.excess[a];
       solve_small();
-      for (int a = 0; a < w.active; ++a) w.multiplier[a] = w.direction[a];
-      dropped = false;
-      for (int a = w.active - 1; a >= 0; --a) {
-        if (w.multiplier[a] < 0.0) {
-          drop(a);
-          dropped = true;
-        }
+      if (w.holds) {
+        subtract_columns(w.start, w.direction, w.way);
+        for (int i = 0; i < length(); i += 8) store(w.way + i, load(w.state + i) - load(w.way + i));
+      }
+      for (int a = 0; a < w.active; ++a) w.direction[a] = w.multiplier[a] - w.direction[a];
+      const Blocking first = blocking();
+      if (!first.any() || first.step >= 1.0) break;
+      if (w.iterations == w.max_iterations) return Outcome::kOutOfBudget;
+      ++w.iterations;
+      go(first.step);
+      if (first.at >= 0) {
+        drop(first.at);
+      } else if (!release(first.id)) {
+        lost_ = true;
+      }
+    }
+    go(1.0);
+    if (!w.holds) combine();
+    return Outcome::kSolved;
+  }
+
+  static constexpr int held_face(const Held& h, int axis) noexcept {
+    return 2 * axis + static_cast<int>((axis == 0 ? h.x : axis == 1 ? h.y : h.z) < 0);
+  }
+  bool is_untouched_apex(int row, const Held& h) const noexcept {
+    const Status* status = w.status + kFaces * row;
+    return h.apex && status[held_face(h, 0)] == kActive && status[held_face(h, 1)] == kActive && status[5] == kActive;
+  }
+  /// At the apex both sides hold: the other one takes the name, and the multiplier with its sign turned.
+  void turn_side(int row, const Held& h, int axis) noexcept {
+    const int face = held_face(h, axis);
+    w.held[row] = static_cast<std::uint8_t>(w.held[row] ^ (3U << (2 * axis)));
+    w.side[axis * w.padded_rows + row] = -w.side[axis * w.padded_rows + row];
+    set_status(kFaces * row + face, kIdle);
+    set_status(kFaces * row + (face ^ 1), kActive);
+    for (int i = 0; i < kFaces; ++i) w.held_columns.of[kFaces * row + i] = -1;
+  }
+
+  /// Of all active constraints, into `last_multiplier`.
+  void name_multipliers() noexcept {
+    for (int a = 0; a < w.active; ++a) w.last_multiplier[w.constraint[a].id] = w.multiplier[a];
+    for (int row = 0; row < w.held_rows; ++row) {
+      if (w.held[row] == 0) continue;
+      const Held h(w.held[row], w.fz_min[row]);
+      double y[3];
+      held_multipliers(h, w.friction, w.padded_rows, w.state + 3 * w.padded_rows + row, y);
+      for (int axis = 0; axis < 3; ++axis) {
+        const int i = kFaces * row + held_face(h, axis);
+        if (w.status[i] == kActive) w.last_multiplier[i] = y[axis];
       }
     }
   }
 
   void begin_with_guesses() noexcept {
     if (w.num_guesses == 0) return;
-    if (w.max_columns - w.num_columns < w.num_guesses) forget_columns(w);
+    if (w.free_columns.max - w.free_columns.num < w.num_guesses) {
+      forget(w.free_columns);
+      w.ahead = 0;
+    }
     if (!take_columns(w, w.guesses, w.num_guesses)) return;
-    for (int i = 0; i < w.num_guesses; ++i) try_append(w.guesses[i]);
-    settle();
+    for (int i = 0; i < w.num_guesses; ++i) {
+      if (try_append(w.guesses[i])) w.multiplier[w.active - 1] = w.guess_multiplier[i];
+    }
   }
 
-  /// forces = free_forces - V y
-  void combine() noexcept {
-    const int n = 3 * w.padded_rows;
-    const double* from = w.free_forces;
+  /// to = from - V y
+  void subtract_columns(const double* from, const double* y, double* to) const noexcept {
+    const int n = length();
     int a = 0;
     for (; a + 4 <= w.active; a += 4) {
       const double* const* v = w.column + a;
-      const Vec y0 = all(w.multiplier[a]);
-      const Vec y1 = all(w.multiplier[a + 1]);
-      const Vec y2 = all(w.multiplier[a + 2]);
-      const Vec y3 = all(w.multiplier[a + 3]);
+      const Vec y0 = all(y[a]);
+      const Vec y1 = all(y[a + 1]);
+      const Vec y2 = all(y[a + 2]);
+      const Vec y3 = all(y[a + 3]);
       for (int i = 0; i < n; i += 8) {
         Vec u = subtract_product(load(from + i), y0, load(v[0] + i));
         Vec t = y1 * load(v[1] + i);
         u = subtract_product(u, y2, load(v[2] + i));
         t = add_product(t, y3, load(v[3] + i));
-        store(w.forces + i, u - t);
+        store(to + i, u - t);
       }
-      from = w.forces;
+      from = to;
     }
     for (; a < w.active; ++a) {
-      const Vec y = all(w.multiplier[a]);
+      const Vec ya = all(y[a]);
       const double* v = w.column[a];
-      for (int i = 0; i < n; i += 8) store(w.forces + i, subtract_product(load(from + i), y, load(v + i)));
-      from = w.forces;
+      for (int i = 0; i < n; i += 8) store(to + i, subtract_product(load(from + i), ya, load(v + i)));
+      from = to;
     }
-    if (w.active == 0) {
-      for (int i = 0; i < n; i += 8) store(w.forces + i, load(from + i));
+    if (from != to) {
+      for (int i = 0; i < n; i += 8) store(to + i, load(from + i));
     }
   }
+  void combine() noexcept { subtract_columns(w.start, w.multiplier, w.state); }
 
   /// violation of every contact; returns the largest.
   double scan() noexcept {
-    const double* x = w.forces;
+    const double* x = w.state;
     const double* y = x + w.padded_rows;
     const double* z = y + w.padded_rows;
     const Vec friction = all(w.friction);
@@ -449,9 +467,9 @@ class ActiveSet {
 
   /// The constraint of contact `row` that is violated most.
   int worst_of(int row) const noexcept {
-    const double x = w.forces[row];
-    const double y = w.forces[w.padded_rows + row];
-    const double z = w.forces[2 * w.padded_rows + row];
+    const double x = w.state[row];
+    const double y = w.state[w.padded_rows + row];
+    const double z = w.state[2 * w.padded_rows + row];
     const double ax = __builtin_fabs(x);
     const double ay = __builtin_fabs(y);
     const double face = (ax >= ay ? ax : ay) - w.friction * z;
@@ -467,14 +485,31 @@ class ActiveSet {
     return worst_of(row);
   }
 
-  /// Appends all violated constraints where they are few. Whether any was.
-  bool append_block() noexcept {
+  /// Appends all violated constraints; where they are many, the most violated, by half and more. Whether any was.
+  bool append_block(double worst) noexcept {
+    int count = candidates_beyond(w.tolerance);
+    if (count > kMaxBlock) count = candidates_beyond(0.5 * worst);
+    if (count > kMaxBlock) count = kMaxBlock;
+    if (!take_columns(w, w.candidates, count)) return false;
+    bool any = false;
+    for (int i = 0; i < count; ++i) {
+      if (w.status[w.candidates[i]] == kReleased) {
+        drop(index_of(w.candidates[i]));
+        any = true;
+      } else {
+        any = try_append(w.candidates[i]) || any;
+      }
+    }
+    return any;
+  }
+  /// Collects constraints that are violated by more than `limit` and may become active.
+  int candidates_beyond(double limit) noexcept {
     int count = 0;
     for (int row = 0; row < w.padded_rows; ++row) {
-      if (!(w.violation[row] > w.tolerance)) continue;
-      const double x = w.forces[row];
-      const double y = w.forces[w.padded_rows + row];
-      const double z = w.forces[2 * w.padded_rows + row];
+      if (!(w.violation[row] > limit)) continue;
+      const double x = w.state[row];
+      const double y = w.state[w.padded_rows + row];
+      const double z = w.state[2 * w.padded_rows + row];
       const double face = w.friction * z;
       const struct {
         int id;
@@ -485,78 +520,200 @@ class ActiveSet {
       int active = w.active_in_row[row];
       for (const auto& c : violated) {
         const int i = kFaces * row + c.id;
-        if (c.violation > w.tolerance && w.is_active[i] == 0 && active < kPerContact) {
-          if (count == kMaxBlock) return false;
+        if (c.violation > limit && w.status[i] != kActive && active < kPerContact) {
           w.candidates[count++] = i;
           ++active;
         }
       }
     }
-    if (!take_columns(w, w.candidates, count)) return false;
-    bool any = false;
-    for (int i = 0; i < count; ++i) any = try_append(w.candidates[i]) || any;
-    return any;
+    return count;
+  }
+  int index_of(int id) const noexcept {
+    int a = 0;
+    while (w.constraint[a].id != id) ++a;
+    return a;
+  }
+
+  /// Up to eight constraints that need columns, the most urgent first, behind one that is needed now.
+  struct Wanted {
+    int ids[8];
+    double urgency[8];
+    int count;
+    explicit Wanted(int id) noexcept : ids{id}, urgency{}, count(1) {}
+    void add(int id, double how_urgent) noexcept {
+      if (id == ids[0] || (count == 8 && how_urgent <= urgency[7])) return;
+      int at = count < 8 ? count++ : 7;
+      for (; at > 1 && urgency[at - 1] < how_urgent; --at) {
+        urgency[at] = urgency[at - 1];
+        ids[at] = ids[at - 1];
+      }
+      urgency[at] = how_urgent;
+      ids[at] = id;
+    }
+  };
+  bool take(const Wanted& wanted) noexcept {
+    const Columns& columns = columns_of(w);
+    const int room = columns.max - columns.num;
+    return take_columns(w, wanted.ids, wanted.count < room ? wanted.count : room) && columns.of[wanted.ids[0]] >= 0;
   }
 
   /// The column of constraint i; where it is to be made, those of the next most violated come along in its lanes.
   bool fetch(int i) noexcept {
-    if (w.column_of[i] >= 0) return true;
-    int ids[8] = {i};
-    double violation[8] = {};
-    int count = 1;
+    const Columns& columns = columns_of(w);
+    if (columns.of[i] >= 0) return true;
+    Wanted wanted(i);
     for (int row = 0; row < w.padded_rows; ++row) {
-      const double v = w.violation[row];
-      if (!(v > w.tolerance) || (count == 8 && v <= violation[7])) continue;
+      if (!(w.violation[row] > w.tolerance)) continue;
       const int other = worst_of(row);
-      if (other == i || w.column_of[other] >= 0) continue;
-      int at = count < 8 ? count++ : 7;
-      for (; at > 1 && violation[at - 1] < v; --at) {
-        violation[at] = violation[at - 1];
-        ids[at] = ids[at - 1];
-      }
-      violation[at] = v;
-      ids[at] = other;
+      if (columns.of[other] < 0) wanted.add(other, w.violation[row]);
     }
-    const int room = w.max_columns - w.num_columns;
-    return take_columns(w, ids, count < room ? count : room) && w.column_of[i] >= 0;
+    return take(wanted);
+  }
+  /// The same of one that is held, with those whose multipliers reach zero next, as `blocking` left them.
+  bool fetch_held(int i) noexcept {
+    const Columns& columns = columns_of(w);
+    if (columns.of[i] >= 0) return true;
+    Wanted wanted(i);
+    for (int axis = 0; axis < 3; ++axis) {
+      for (int row = 0; row < w.rows; ++row) {
+        const double step = w.to_zero[axis * w.padded_rows + row];
+        if (!(step < 1.0)) continue;
+        const int other = held_constraint(row, axis);
+        if (columns.of[other] < 0) wanted.add(other, 1.0 - step);
+      }
+    }
+    return take(wanted);
+  }
+  int held_constraint(int row, int axis) const noexcept {
+    return kFaces * row + 2 * axis + static_cast<int>(w.side[axis * w.padded_rows + row] < 0.0);
+  }
+
+  /// What stops a step: an active constraint, or one that is held, whose multiplier reaches zero.
+  struct Blocking {
+    double step = 0.0;
+    int at = -1;  ///< in the active set
+    int id = -1;  ///< held
+    bool any() const noexcept { return at >= 0 || id >= 0; }
+    /// The least of multiplier / rate so far; one below zero by rounding counts as zero.
+    bool is_met(double multiplier, double rate) noexcept {
+      if (!(rate > kNoMultiplier)) return false;
+      const double to_zero = multiplier > 0.0 ? multiplier / rate : 0.0;
+      if (any() && to_zero >= step) return false;
+      step = to_zero;
+      return true;
+    }
+  };
+  /// Along `direction` and `way`.
+  Blocking blocking() const noexcept {
+    Blocking first;
+    for (int a = 0; a < w.active; ++a) {
+      if (w.sign[a] > 0.0 && first.is_met(w.multiplier[a], w.direction[a])) first.at = a;
+    }
+    if (!w.holds) return first;
+    const int P = w.padded_rows;
+    const double* d = w.state + 3 * P;
+    const double* rate_of_d = w.way + 3 * P;
+    const Vec friction = all(w.friction);
+    const Vec least = all(kNoMultiplier);
+    const Vec never = all(kNever);
+    Vec first_of_all = zeros() - never;
+    for (int row = 0; row < P; row += 8) {
+      const Vec side[3] = {load(w.side + row), load(w.side + P + row), load(w.side + 2 * P + row)};
+      const auto multipliers = [&](const double* s, Vec(&y)[3]) noexcept {
+        y[0] = zeros() - side[0] * load(s + row);
+        y[1] = zeros() - side[1] * load(s + P + row);
+        y[2] = side[2] * (friction * (y[0] + y[1]) - load(s + 2 * P + row));
+      };
+      Vec y[3], rate[3];
+      multipliers(d, y);
+      multipliers(rate_of_d, rate);
+      for (int axis = 0; axis < 3; ++axis) {
+        const Vec falls = rate[axis] * load(w.still + axis * P + row);
+        const Vec step = where_larger(falls, least, larger(y[axis], zeros()) / falls, never);
+        store(w.to_zero + axis * P + row, step);
+        first_of_all = larger(first_of_all, zeros() - step);
+      }
+    }
+    const double step = -largest(first_of_all);
+    if (step == kNever || (first.any() && step >= first.step)) return first;
+    int at = 0;
+    while (w.to_zero[at] != step) ++at;
+    first = {step, -1, held_constraint(at % P, at / P)};
+    return first;
+  }
+  void go(double step) noexcept {
+    for (int a = 0; a < w.active; ++a) w.multiplier[a] -= step * w.direction[a];
+    if (!w.holds) return;
+    const Vec t = all(step);
+    for (int i = 0; i < length(); i += 8) store(w.state + i, subtract_product(load(w.state + i), t, load(w.way + i)));
+  }
+  /// Lets go of a held constraint whose multiplier is zero.
+  bool release(int i) noexcept {
+    const int row = i / kFaces;
+    const int axis = i % kFaces / 2;
+    const Held h(w.held[row], w.fz_min[row]);
+    if (axis < 2 && is_untouched_apex(row, h)) {
+      turn_side(row, h, axis);
+      return true;
+    }
+    return fetch_held(i) && try_append(i);
   }
 
   /// One step of Goldfarb and Idnani: constraint i, violated by `violation`, becomes active; those whose multipliers
   /// reach zero on the way are dropped.
   Outcome step(int i, double violation) noexcept {
+    const bool was_held = w.status[i] == kReleased;
     if (!fetch(i)) return Outcome::kOutOfBudget;
     const double* v = column_of(i);
     const Constraint c = constraint_of(i);
     const double curvature = along(c, v);
     double multiplier = 0.0;
     for (;;) {
-      const double left = curvature_left(c, v);
-      const bool independent = left > kDependent * curvature;
-      int blocking = -1;
-      double blocking_step = 0.0;
-      for (int a = 0; a < w.active; ++a) {
-        if (w.direction[a] <= kNoMultiplier) continue;
-        const double to_zero = w.multiplier[a] / w.direction[a];
-        if (blocking < 0 || to_zero < blocking_step) {
-          blocking = a;
-          blocking_step = to_zero;
-        }
+      double rate = 0.0;  // at which the violation shrinks with the multiplier
+      bool independent = false;
+      if (was_held) {
+        const int at = index_of(i);
+        for (int a = 0; a < w.active; ++a) w.right[a] = 0.0;
+        w.right[at] = 1.0;
+        solve_small();
+        rate = -w.direction[at];
+        independent = rate > 0.0;
+      } else {
+        rate = pivot_left(c, v);
+        independent = rate > kDependent * curvature;
       }
-      const double full_step = independent ? violation / left : 0.0;
-      if (independent && (blocking < 0 || full_step <= blocking_step)) {
+      if (w.holds) {
+        if (was_held) {
+          for (int at = 0; at < length(); at += 8) store(w.way + at, zeros());
+        }
+        subtract_columns(was_held ? w.way : v, w.direction, w.way);
+      }
+      const Blocking first = blocking();
+      const double full_step = independent ? violation / rate : 0.0;
+      if (independent && (!first.any() || full_step <= first.step)) {
         if (w.active == w.max_active) return Outcome::kOutOfBudget;
-        for (int a = 0; a < w.active; ++a) w.multiplier[a] -= full_step * w.direction[a];
-        append(c, v, left);
-        w.multiplier[w.active - 1] = multiplier + full_step;
+        go(full_step);
+        if (was_held) {
+          drop(index_of(i));
+        } else {
+          append(c, v, rate);
+          w.multiplier[w.active - 1] = multiplier + full_step;
+        }
+        if (!w.holds) combine();
         return Outcome::kSolved;
       }
-      if (blocking < 0) return Outcome::kSingular;
+      if (lost_) return Outcome::kSolved;  // and the set is held anew
+      if (!first.any()) return Outcome::kSingular;
       if (w.iterations == w.max_iterations) return Outcome::kOutOfBudget;
       ++w.iterations;
-      for (int a = 0; a < w.active; ++a) w.multiplier[a] -= blocking_step * w.direction[a];
-      multiplier += blocking_step;
-      if (independent) violation -= blocking_step * left;
-      drop(blocking);
+      go(first.step);
+      multiplier += first.step;
+      if (independent) violation -= first.step * rate;
+      if (first.at >= 0) {
+        drop(first.at);
+      } else if (!release(first.id)) {
+        lost_ = true;
+      }
     }
   }
 
@@ -564,26 +721,29 @@ class ActiveSet {
   void correct_rounding() noexcept {
     double worst = 0.0;
     for (int a = 0; a < w.active; ++a) {
-      w.right[a] = along(w.constraint[a], w.forces) - w.constraint[a].bound;
+      w.right[a] = along(w.constraint[a], w.state) - w.constraint[a].bound;
       const double size = __builtin_fabs(w.right[a]);
       worst = size > worst ? size : worst;
     }
     if (!(worst > kExactlyActive * w.tolerance)) return;
     solve_small();
-    const double* from = w.forces;
-    for (int a = 0; a < w.active; ++a) {
-      w.multiplier[a] += w.direction[a];
-      const Vec y = all(w.direction[a]);
-      const double* v = w.column[a];
-      for (int i = 0; i < 3 * w.padded_rows; i += 8) {
-        store(w.forces + i, subtract_product(load(from + i), y, load(v + i)));
-      }
-    }
+    for (int a = 0; a < w.active; ++a) w.multiplier[a] += w.direction[a];
+    subtract_columns(w.state, w.direction, w.state);
   }
 
   Workspace<NC>& w;
+  int holds_ = 0;      ///< sets held in this solve
+  bool lost_ = false;  ///< what L_inverse was, to rounding
 };
 
+template <int NC>
+void take_stages(Workspace<NC>& w) noexcept {
+  forget(w.free_columns);
+  forget(w.held_columns);
+  w.ahead = 0;
+  w.factor_stands = w.held_factor_stands = false;
+  for (int k = 0; k < w.num_stages; ++k) make_rows(w.stages[k]);
+}
 template <int NC>
 Outcome solve(Workspace<NC>& w) noexcept {
   return ActiveSet<NC>(w).solve();
@@ -595,7 +755,7 @@ void refine(Workspace<NC>& w) noexcept {
 
 template <int NC>
 constexpr Path<NC> path() noexcept {
-  return {&factor<NC>, &take_ahead<NC>, &solve<NC>, &refine<NC>};
+  return {&take_stages<NC>, &factor<NC>, &take_ahead<NC>, &solve<NC>, &refine<NC>};
 }
 
 }  // namespace stance::force_qp::structured::STANCE_ISA

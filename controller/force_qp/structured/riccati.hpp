@@ -199,6 +199,7 @@ template <int M>
 struct Free {
   static constexpr int U = 3 * M;
   double keep[U], slope[U];
+  bool any = false;
 
   Free(const std::uint8_t* held, const double* fz_min, double friction) noexcept {
     for (int slot = 0; slot < M; ++slot) {
@@ -208,6 +209,7 @@ struct Free {
       k[0] = static_cast<int>(h.x == 0) & static_cast<int>(!h.apex);
       k[1] = static_cast<int>(h.y == 0) & static_cast<int>(!h.apex);
       k[2] = static_cast<int>(h.z == 0);
+      any = any || k[0] + k[1] + k[2] > 0.0;
       e[0] = k[2] * h.x * friction;
       e[1] = k[2] * h.y * friction;
       e[2] = 0.0;
@@ -253,11 +255,10 @@ struct Free {
 };
 
 /// One backward step: `next` is the cost-to-go of x_(k+1); `cost` becomes that of x_k, with Q of x_k added, where
-/// `before`, stage k - 1, is given. With T (T'Quu T)^-1 T' in the place of Quu^-1 where faces are held, `held` not
-/// null.
-template <int M, int NC>
+/// `before`, stage k - 1, is given. With T (T'Quu T)^-1 T' in the place of Quu^-1 where there are faces held.
+template <int M, bool kHeld, int NC>
 inline bool factor_stage(const Workspace<NC>& w, const Stage<NC>& s, const Stage<NC>* before, const Cost& next,
-                         const std::uint8_t* held, Gain<NC>& gain, Cost& cost) noexcept {
+                         Gain<NC>& gain, Cost& cost) noexcept {
   constexpr int U = 3 * M;
   constexpr int kPairs = (M + 1) / 2;
   Vec PB_pose[U], PB_rate[U];  // P B
@@ -281,41 +282,68 @@ inline bool factor_stage(const Workspace<NC>& w, const Stage<NC>& s, const Stage
     }
     Quu[c][c] += s.R[c / 6].v[lane_of(c % 6)];
   }
-  if (held != nullptr) Free<M>(held, w.fz_min + s.first_row, w.friction).reduce(Quu);
-  if (!invert<U>(Quu, X)) return false;
-  if (held != nullptr) Free<M>(held, w.fz_min + s.first_row, w.friction).extend(X);
-  for (int pair = 0; pair < kPairs; ++pair) {
-    for (int c = 0; c < U; ++c) {
-      for (int i = 0; i < 6; ++i) gain.Quu_inverse[pair][c].v[lane_of(i)] = 6 * pair + i < U ? X[c][6 * pair + i] : 0.0;
+  const auto as_columns = [](const double(&H)[U][U], Lanes(&columns)[Gain<NC>::kPairs][3 * NC]) noexcept {
+    for (int pair = 0; pair < kPairs; ++pair) {
+      for (int c = 0; c < U; ++c) {
+        for (int i = 0; i < 6; ++i) columns[pair][c].v[lane_of(i)] = 6 * pair + i < U ? H[c][6 * pair + i] : 0.0;
+      }
+    }
+  };
+  bool moves = true;
+  if constexpr (kHeld) {
+    as_columns(Quu, gain.Quu);
+    const Free<M> free(w.held + s.first_row, w.fz_min + s.first_row, w.friction);
+    moves = free.any;
+    if (moves) {
+      free.reduce(Quu);
+      if (!invert<U>(Quu, X)) return false;
+      free.extend(X);
+    }
+  } else {
+    if (!invert<U>(Quu, X)) return false;
+  }
+  if (!moves) {
+    for (double(&row)[U] : X) {
+      for (double& x : row) x = 0.0;
     }
   }
+  as_columns(X, gain.Quu_inverse);
+  gain.moves = moves;
 
   // Qux = B'P A and K
   Lanes Qux_pose[U], Qux_rate[U];
   for (int c = 0; c < U; ++c) {
     store(Qux_pose[c], add_Ct_times(s, PB_pose[c], PB_rate[c]));
     store(Qux_rate[c], Dt_times(s, PB_pose[c]) + PB_rate[c]);
+    if constexpr (kHeld) {
+      gain.Qux_pose[c] = Qux_pose[c];
+      gain.Qux_rate[c] = Qux_rate[c];
+    }
   }
   Vec K_pose[U], K_rate[U];
-  for (int c = 0; c < U; ++c) {
-    Vec pose = all(X[c][0]) * load(Qux_pose[0]);
-    Vec rate = all(X[c][0]) * load(Qux_rate[0]);
-    for (int e = 1; e < U; ++e) {
-      pose = add_product(pose, all(X[c][e]), load(Qux_pose[e]));
-      rate = add_product(rate, all(X[c][e]), load(Qux_rate[e]));
+  if (moves) {
+    for (int c = 0; c < U; ++c) {
+      Vec pose = all(X[c][0]) * load(Qux_pose[0]);
+      Vec rate = all(X[c][0]) * load(Qux_rate[0]);
+      for (int e = 1; e < U; ++e) {
+        pose = add_product(pose, all(X[c][e]), load(Qux_pose[e]));
+        rate = add_product(rate, all(X[c][e]), load(Qux_rate[e]));
+      }
+      K_pose[c] = pose;
+      K_rate[c] = rate;
+      store(gain.K_pose[c], pose);
+      store(gain.K_rate[c], rate);
     }
-    K_pose[c] = pose;
-    K_rate[c] = rate;
-    store(gain.K_pose[c], pose);
-    store(gain.K_rate[c], rate);
-  }
-  for (int slot = 0; slot < M; ++slot) {
-    Vec t[4] = {K_pose[3 * slot], K_pose[3 * slot + 1], K_pose[3 * slot + 2], zeros()};
-    transpose_halves(t);
-    for (int j = 0; j < 3; ++j) store(gain.K_columns[slot][j], t[j]);
-    Vec r[4] = {K_rate[3 * slot], K_rate[3 * slot + 1], K_rate[3 * slot + 2], zeros()};
-    transpose_halves(r);
-    for (int j = 0; j < 3; ++j) store(gain.K_columns[slot][3 + j], r[j]);
+    for (int slot = 0; slot < M; ++slot) {
+      Vec t[4] = {K_pose[3 * slot], K_pose[3 * slot + 1], K_pose[3 * slot + 2], zeros()};
+      transpose_halves(t);
+      for (int j = 0; j < 3; ++j) store(gain.K_columns[slot][j], t[j]);
+      Vec r[4] = {K_rate[3 * slot], K_rate[3 * slot + 1], K_rate[3 * slot + 2], zeros()};
+      transpose_halves(r);
+      for (int j = 0; j < 3; ++j) store(gain.K_columns[slot][3 + j], r[j]);
+    }
+  } else {
+    for (int c = 0; c < U; ++c) gain.K_pose[c] = gain.K_rate[c] = Lanes{};
   }
   if (before == nullptr) return true;
 
@@ -345,7 +373,7 @@ inline bool factor_stage(const Workspace<NC>& w, const Stage<NC>& s, const Stage
     Vec pose_pose = add_Ct_times(s, PA_pose_pose, PA_rate_pose);
     Vec pose_rate = add_Ct_times(s, PA_pose_rate, PA_rate_rate);
     Vec rate_rate = Dt_times(s, PA_pose_rate) + PA_rate_rate;
-    for (int c = 0; c < U; ++c) {
+    for (int c = 0; c < U && moves; ++c) {
       const Vec rate = entry(Qux_rate[c], j);
       pose_pose = subtract_product(pose_pose, K_pose[c], entry(Qux_pose[c], j));
       pose_rate = subtract_product(pose_rate, K_pose[c], rate);
@@ -367,29 +395,21 @@ inline bool factor_stage(const Workspace<NC>& w, const Stage<NC>& s, const Stage
   return true;
 }
 
-template <int NC>
-void forget_columns(Workspace<NC>& w) noexcept {
-  for (int i = 0; i < w.num_columns; ++i) w.column_of[w.column_constraint[i]] = -1;
-  w.num_columns = 0;
-  w.ahead = 0;
-}
-
 /// False where Quu is not positive definite.
 template <int NC>
 bool factor(Workspace<NC>& w) noexcept {
-  forget_columns(w);
   Cost costs[2];  // in turns
   const Cost* next = &w.terminal;
   bool positive = true;
   for (int k = w.num_stages - 1; k >= 0 && positive; --k) {
-    Stage<NC>& s = w.stages[k];
-    make_rows(s);
+    const Stage<NC>& s = w.stages[k];
     Cost& cost = costs[k % 2];
     with_slots(s, [&]<int M>() noexcept {
-      positive = factor_stage<M>(w, s, k > 0 ? &w.stages[k - 1] : nullptr, *next, nullptr, w.gains[k], cost);
+      positive = factor_stage<M, false>(w, s, k > 0 ? &w.stages[k - 1] : nullptr, *next, w.gains[k], cost);
     });
     next = &cost;
   }
+  w.factor_stands = positive;
   return positive;
 }
 
@@ -404,8 +424,9 @@ bool factor_held(Workspace<NC>& w, int last) noexcept {
     with_slots(s, [&]<int M>() noexcept {
       bool any = false;
       for (int slot = 0; slot < M; ++slot) any = any || held[slot] != 0;
-      positive = factor_stage<M>(w, s, k > 0 ? &w.stages[k - 1] : nullptr, next, any ? held : nullptr, w.held_gains[k],
-                                 w.held_costs[k]);
+      const Stage<NC>* before = k > 0 ? &w.stages[k - 1] : nullptr;
+      positive = any ? factor_stage<M, true>(w, s, before, next, w.held_gains[k], w.held_costs[k])
+                     : factor_stage<M, false>(w, s, before, next, w.held_gains[k], w.held_costs[k]);
     });
   }
   return positive;
@@ -514,10 +535,10 @@ void gradient_at(const Workspace<NC>& w, const double* forces, double* gradient)
 /// The minimiser of the cost plus pull' f, as a step from the path of `nominal`; f_ref, and no pull, where they are
 /// null. Exact from any nominal; the nearer it is, the less is rounded. With the gains of faces that are held the step
 /// stays within them: `nominal` must lie in each. From a nominal path z is left along the path of the result.
-template <int NC>
-void sweep(Workspace<NC>& w, const Gain<NC>* gains, const double* nominal, const double* pull,
-           double* forces) noexcept {
+template <bool kWithin, int NC>
+void sweep(Workspace<NC>& w, const double* nominal, const double* pull, double* forces) noexcept {
   constexpr int kPairs = Stage<NC>::kPairs;
+  const Gain<NC>* gains = kWithin ? w.held_gains : w.gains;
   const int N = w.num_stages;
   roll(w, nominal);
   Vec p_pose, p_rate;  // the costate p of x_(k+1), Q z included
@@ -525,6 +546,7 @@ void sweep(Workspace<NC>& w, const Gain<NC>* gains, const double* nominal, const
   for (int k = N - 1; k >= 0; --k) {
     const Stage<NC>& s = w.stages[k];
     const Gain<NC>& gain = gains[k];
+    const bool moves = !kWithin || gain.moves;
     with_slots(s, [&]<int M>() noexcept {
       constexpr int kUsed = (M + 1) / 2;
       Vec su[kUsed];
@@ -541,7 +563,7 @@ void sweep(Workspace<NC>& w, const Gain<NC>* gains, const double* nominal, const
           su[pair] = su[pair] + add_product(pulled[pair], load(s.R[pair]), f[pair] - load(s.f_ref[pair]));
         }
       }
-      for (int pair = 0; pair < kUsed; ++pair) {
+      for (int pair = 0; pair < kUsed && moves; ++pair) {
         Vec f = zeros();
         for (int of = 0; of < kUsed; ++of) f = add_columns<M>(f, gain.Quu_inverse[pair] + 6 * of, su[of]);
         store(w.feedforward[k * kPairs + pair], f);
@@ -549,7 +571,7 @@ void sweep(Workspace<NC>& w, const Gain<NC>* gains, const double* nominal, const
       if (k == 0) return;
       Vec pull_pose = zeros();
       Vec pull_rate = zeros();
-      for (int pair = 0; pair < kUsed; ++pair) {
+      for (int pair = 0; pair < kUsed && moves; ++pair) {
         pull_pose = add_columns<M>(pull_pose, gain.K_pose + 6 * pair, su[pair]);
         pull_rate = add_columns<M>(pull_rate, gain.K_rate + 6 * pair, su[pair]);
       }
@@ -564,11 +586,13 @@ void sweep(Workspace<NC>& w, const Gain<NC>* gains, const double* nominal, const
   for (int k = 0; k < N; ++k) {
     const Stage<NC>& s = w.stages[k];
     const Gain<NC>& gain = gains[k];
+    const bool moves = !kWithin || gain.moves;
     with_slots(s, [&]<int M>() noexcept {
       constexpr int kUsed = (M + 1) / 2;
       Vec step[kUsed], f[kUsed];
       for (int pair = 0; pair < kUsed; ++pair) {
-        step[pair] = zeros() - load(w.feedforward[k * kPairs + pair]) - K_times<M>(gain, pair, pose, rate);
+        step[pair] =
+            moves ? zeros() - load(w.feedforward[k * kPairs + pair]) - K_times<M>(gain, pair, pose, rate) : zeros();
       }
       if (nominal == nullptr) {
         for (int pair = 0; pair < kUsed; ++pair) f[pair] = load(s.f_ref[pair]);

@@ -9,6 +9,7 @@
 //   lane_of_halves<J>(a)    lane J of each half, in all lanes of that half
 //   low_halves(a, b)        (a's low half | b's low half); high_halves likewise
 //   transpose_halves(a)     a[i], lane j of each half <-> a[j], lane i
+//   where_larger(a, b, x, y)   lanes of x where a > b, else of y
 //   add_product(c, a, b)    c + a b, rounded once; subtract_product c - a b
 //
 // Rounding is the same on every path: products are fused where add_product says so and nowhere else

@@ -36,6 +36,13 @@ inline Vec add_product(const Vec& c, const Vec& a, const Vec& b) noexcept {
 inline Vec subtract_product(const Vec& c, const Vec& a, const Vec& b) noexcept {
   return {_mm256_fnmadd_pd(a.low, b.low, c.low), _mm256_fnmadd_pd(a.high, b.high, c.high)};
 }
+inline Vec operator/(const Vec& a, const Vec& b) noexcept {
+  return {_mm256_div_pd(a.low, b.low), _mm256_div_pd(a.high, b.high)};
+}
+inline Vec where_larger(const Vec& a, const Vec& b, const Vec& x, const Vec& y) noexcept {
+  return {_mm256_blendv_pd(y.low, x.low, _mm256_cmp_pd(a.low, b.low, _CMP_GT_OQ)),
+          _mm256_blendv_pd(y.high, x.high, _mm256_cmp_pd(a.high, b.high, _CMP_GT_OQ))};
+}
 inline Vec larger(const Vec& a, const Vec& b) noexcept {
   return {_mm256_max_pd(a.low, b.low), _mm256_max_pd(a.high, b.high)};
 }

@@ -22,6 +22,10 @@ inline Vec add_product(const Vec& c, const Vec& a, const Vec& b) noexcept { retu
 inline Vec subtract_product(const Vec& c, const Vec& a, const Vec& b) noexcept {
   return {_mm512_fnmadd_pd(a.v, b.v, c.v)};
 }
+inline Vec operator/(const Vec& a, const Vec& b) noexcept { return {_mm512_div_pd(a.v, b.v)}; }
+inline Vec where_larger(const Vec& a, const Vec& b, const Vec& x, const Vec& y) noexcept {
+  return {_mm512_mask_blend_pd(_mm512_cmp_pd_mask(a.v, b.v, _CMP_GT_OQ), y.v, x.v)};
+}
 inline Vec larger(const Vec& a, const Vec& b) noexcept { return {_mm512_max_pd(a.v, b.v)}; }
 inline Vec magnitude(const Vec& a) noexcept { return {_mm512_abs_pd(a.v)}; }
 template <int J>

@@ -41,6 +41,12 @@ inline Vec add_product(const Vec& c, const Vec& a, const Vec& b) noexcept {
 inline Vec subtract_product(const Vec& c, const Vec& a, const Vec& b) noexcept {
   return lanewise([&](int i) { return std::fma(-a.v[i], b.v[i], c.v[i]); });
 }
+inline Vec operator/(const Vec& a, const Vec& b) noexcept {
+  return lanewise([&](int i) { return a.v[i] / b.v[i]; });
+}
+inline Vec where_larger(const Vec& a, const Vec& b, const Vec& x, const Vec& y) noexcept {
+  return lanewise([&](int i) { return a.v[i] > b.v[i] ? x.v[i] : y.v[i]; });
+}
 inline Vec larger(const Vec& a, const Vec& b) noexcept {
   return lanewise([&](int i) { return a.v[i] > b.v[i] ? a.v[i] : b.v[i]; });
 }

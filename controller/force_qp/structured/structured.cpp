@@ -1,5 +1,6 @@
 #include "controller/force_qp/structured/structured.hpp"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
@@ -14,6 +15,7 @@ namespace {
 
 constexpr double kTolerance = 1e-10;  // of a violation that counts as none, relative to the typical force
 constexpr int kMaxColumns = 1024;     // that are kept, and constraints that may be active
+constexpr int kMaxHeldColumns = 192;  // within held faces
 
 constexpr int padded(int count) { return (count + 7) / 8 * 8; }
 
@@ -61,6 +63,7 @@ class Solver final : public StructuredSolver {
         path_(path_of<NC>(simd)),
         max_rows_(static_cast<std::size_t>(padded(sizes.num_stages * NC))),
         max_columns_(std::min(kFaces * max_rows_, static_cast<std::size_t>(kMaxColumns))),
+        max_held_columns_(std::min(kFaces * max_rows_, static_cast<std::size_t>(kMaxHeldColumns))),
         max_active_(std::min(3 * max_rows_, max_columns_)),
         stages_(num_stages(), Stage<NC>{}),
         gains_(num_stages(), Gain<NC>{}),
@@ -68,22 +71,25 @@ class Solver final : public StructuredSolver {
         held_costs_(num_stages(), Cost{}),
         states_(2 * num_stages(), Lanes{}),
         feedforward_(num_stages() * Stage<NC>::kPairs, Lanes{}),
-        eight_forces_(3 * max_rows_, Lanes{}),
+        eight_states_(6 * max_rows_, Lanes{}),
         eight_feedforward_(num_stages() * 3 * NC, Lanes{}),
+        eight_right_(num_stages() * 3 * NC, Lanes{}),
         row_numbers_(3 * max_rows_),
-        force_numbers_(9 * max_rows_),
+        state_numbers_(30 * max_rows_),
+        multipliers_(2 * kFaces * max_rows_),
         columns_(max_columns_ * 3 * max_rows_),
-        set_numbers_(5 * stride()),
+        held_columns_(max_held_columns_ * 6 * max_rows_),
+        set_numbers_(6 * stride()),
         L_inverse_((max_active_ + 8) * stride()),
         columns_of_set_(max_active_ + 1, nullptr),
         row_stage_(max_rows_, 0),
-        constraint_column_(kFaces * max_rows_, -1),
-        column_constraint_(max_columns_, 0),
+        constraint_column_(2 * kFaces * max_rows_, -1),
+        column_constraint_(max_columns_ + max_held_columns_, 0),
         candidates_(kFaces * max_rows_, 0),
         guesses_(kFaces * max_rows_, 0),
         set_constraint_(max_active_ + 1),
-        held_(max_rows_, 0),
-        is_active_(kFaces * max_rows_, 0),
+        held_(2 * max_rows_, 0),
+        status_(kFaces * max_rows_, kIdle),
         active_in_row_(max_rows_, 0),
         contact_of_slot_(num_stages()),
         start_(num_stages(), 0.0),
@@ -97,6 +103,7 @@ class Solver final : public StructuredSolver {
     w.stages = stages_.data();
     w.gains = gains_.data();
     w.held = held_.data();
+    w.next_held = w.held + max_rows_;
     w.held_gains = held_gains_.data();
     w.held_costs = held_costs_.data();
     w.row_stage = row_stage_.data();
@@ -106,12 +113,13 @@ class Solver final : public StructuredSolver {
     w.z_pose = states_.data();
     w.z_rate = w.z_pose + num_stages();
     w.feedforward = feedforward_.data();
-    w.max_columns = static_cast<int>(max_columns_);
-    w.column_of = constraint_column_.data();
-    w.column_constraint = column_constraint_.data();
-    w.columns = columns_.data();
-    w.eight_forces = eight_forces_.data();
+    w.free_columns = {static_cast<int>(max_columns_), 0, constraint_column_.data(), column_constraint_.data(),
+                      columns_.data()};
+    w.held_columns = {static_cast<int>(max_held_columns_), 0, w.free_columns.of + kFaces * max_rows_,
+                      w.free_columns.constraint + max_columns_, held_columns_.data()};
+    w.eight_states = eight_states_.data();
     w.eight_feedforward = eight_feedforward_.data();
+    w.eight_right = eight_right_.data();
     w.max_active = static_cast<int>(max_active_);
     w.stride = static_cast<int>(stride());
     w.constraint = set_constraint_.data();
@@ -120,13 +128,20 @@ class Solver final : public StructuredSolver {
     w.right = w.excess + stride();
     w.half = w.right + stride();
     w.direction = w.half + stride();
+    w.sign = w.direction + stride();
     w.column = columns_of_set_.data();
-    w.is_active = is_active_.data();
+    w.status = status_.data();
     w.active_in_row = active_in_row_.data();
     w.L_inverse = L_inverse_.data();
-    w.free_forces = force_numbers_.data();
-    w.forces = w.free_forces + 3 * max_rows_;
-    w.gradient = w.forces + 3 * max_rows_;
+    w.start = state_numbers_.data();
+    w.state = w.start + 6 * max_rows_;
+    w.way = w.state + 6 * max_rows_;
+    w.before = w.way + 6 * max_rows_;
+    w.side = w.before + 3 * max_rows_;
+    w.still = w.side + 3 * max_rows_;
+    w.to_zero = w.still + 3 * max_rows_;
+    w.guess_multiplier = multipliers_.data();
+    w.last_multiplier = w.guess_multiplier + kFaces * max_rows_;
     w.candidates = candidates_.data();
     w.guesses = guesses_.data();
   }
@@ -147,10 +162,11 @@ class Solver final : public StructuredSolver {
     w.padded_rows = padded(row);
     for (; row < w.padded_rows; ++row) {
       w.fz_min[row] = w.fz_max[row] = 0.0;
-      for (int d = 0; d < 3; ++d) w.free_forces[d * w.padded_rows + row] = w.forces[d * w.padded_rows + row] = 0.0;
+      for (int d = 0; d < 6; ++d) w.start[d * w.padded_rows + row] = w.state[d * w.padded_rows + row] = 0.0;
     }
-    take_terminal_cost(problem);
-    return path_.factor(w);
+    const bool is_convex = take_terminal_cost(problem);
+    path_.take_stages(w);
+    return is_convex || path_.factor(w);
   }
 
   void take_vectors(const Problem& problem) noexcept override {
@@ -183,7 +199,7 @@ class Solver final : public StructuredSolver {
   void refine() noexcept override { path_.refine(w_); }
   void take_ahead() noexcept override { path_.take_ahead(w_); }
   int iterations() const noexcept override { return w_.iterations; }
-  bool ended_by_revision() const noexcept override { return w_.ends_held; }
+  bool holds() const noexcept override { return w_.holds; }
 
   void forces(std::vector<ForceVector>& out) const noexcept override {
     for (std::size_t k = 0; k < num_stages(); ++k) {
@@ -192,14 +208,16 @@ class Solver final : public StructuredSolver {
         const int contact = contact_of_slot_[k][static_cast<std::size_t>(slot)];
         if (contact < 0) continue;
         for (int d = 0; d < 3; ++d) {
-          out[k][3 * contact + d] = w_.forces[d * w_.padded_rows + stages_[k].first_row + slot];
+          out[k][3 * contact + d] = w_.state[d * w_.padded_rows + stages_[k].first_row + slot];
         }
       }
     }
   }
 
   void reset() noexcept override {
-    for (auto& stage : remembered_) stage.fill(0);
+    for (auto& stage : remembered_) {
+      for (Remembered& of : stage) of.faces = 0;
+    }
     any_remembered_ = false;
   }
 
@@ -243,7 +261,8 @@ class Solver final : public StructuredSolver {
     put_state(s.Q_pose, s.Q_rate, data.Q);
   }
 
-  void take_terminal_cost(const Problem& problem) noexcept {
+  /// Whether the cost is convex for certain: where it is not, the factor tells.
+  bool take_terminal_cost(const Problem& problem) noexcept {
     Cost& P = w_.terminal;
     if (w_.has_terminal_cost && !problem.has_terminal_cost) P = Cost{};  // off the diagonal it is zero else
     w_.has_terminal_cost = problem.has_terminal_cost;
@@ -256,6 +275,12 @@ class Solver final : public StructuredSolver {
         P.rate_rate[j].v[j + j / 3] = problem.stages.back().Q[6 + j];
       }
     }
+    if (!problem.has_terminal_cost) return true;
+    if (problem.terminal_cost != terminal_cost_) {
+      terminal_cost_ = problem.terminal_cost;
+      is_positive_ = terminal_cost_.llt().info() == Eigen::Success;
+    }
+    return is_positive_;
   }
 
   /// The set to begin with: of each stage what was active at its middle in the last solution, whose stages began one
@@ -270,9 +295,11 @@ class Solver final : public StructuredSolver {
       for (int slot = 0; slot < stages_[k].slots; ++slot) {
         const int contact = contact_of_slot_[k][static_cast<std::size_t>(slot)];
         if (contact < 0) continue;
-        const unsigned faces = remembered_[then][static_cast<std::size_t>(contact)];
+        const Remembered& of = remembered_[then][static_cast<std::size_t>(contact)];
         for (int face = 0; face < kFaces; ++face) {
-          if ((faces >> face & 1U) != 0U) guesses_[w_.num_guesses++] = kFaces * (stages_[k].first_row + slot) + face;
+          if ((of.faces >> face & 1U) == 0U) continue;
+          w_.guess_multiplier[w_.num_guesses] = of.multiplier[face];
+          guesses_[w_.num_guesses++] = kFaces * (stages_[k].first_row + slot) + face;
         }
       }
     }
@@ -280,21 +307,19 @@ class Solver final : public StructuredSolver {
 
   void remember() noexcept {
     if (any_remembered_) reset();
-    const auto remember_faces = [this](int row, unsigned faces) noexcept {
+    for (int row = 0; row < w_.rows; ++row) {
+      if (w_.active_in_row[row] == 0) continue;
       const auto k = static_cast<std::size_t>(w_.row_stage[row]);
       const int contact = contact_of_slot_[k][static_cast<std::size_t>(row - stages_[k].first_row)];
-      if (contact < 0) return;
-      remembered_[k][static_cast<std::size_t>(contact)] |= faces;
+      if (contact < 0) continue;
+      Remembered& of = remembered_[k][static_cast<std::size_t>(contact)];
+      for (int face = 0; face < kFaces; ++face) {
+        const int i = kFaces * row + face;
+        if (w_.status[i] != kActive) continue;
+        of.faces |= 1U << face;
+        of.multiplier[face] = w_.last_multiplier[i];
+      }
       any_remembered_ = true;
-    };
-    if (w_.ends_held) {
-      for (int row = 0; row < w_.rows; ++row) {
-        if (w_.held[row] != 0) remember_faces(row, w_.held[row]);
-      }
-    } else {
-      for (int a = 0; a < w_.active; ++a) {
-        remember_faces(w_.constraint[a].id / kFaces, 1U << (w_.constraint[a].id % kFaces));
-      }
     }
     if (!any_remembered_) return;
     remembered_shift_ = duration_.front();
@@ -305,29 +330,37 @@ class Solver final : public StructuredSolver {
   const Path<NC>& path_;
   std::size_t max_rows_;
   std::size_t max_columns_;
+  std::size_t max_held_columns_;
   std::size_t max_active_;
   std::vector<Stage<NC>> stages_;
   std::vector<Gain<NC>> gains_, held_gains_;
   std::vector<Cost> held_costs_;
-  std::vector<Lanes> states_, feedforward_, eight_forces_, eight_feedforward_;
-  Numbers row_numbers_, force_numbers_, columns_, set_numbers_, L_inverse_;
+  std::vector<Lanes> states_, feedforward_, eight_states_, eight_feedforward_, eight_right_;
+  Numbers row_numbers_, state_numbers_, multipliers_, columns_, held_columns_, set_numbers_, L_inverse_;
   std::vector<const double*> columns_of_set_;
   std::vector<int> row_stage_, constraint_column_, column_constraint_, candidates_, guesses_;
   std::vector<Constraint> set_constraint_;
   std::vector<std::uint8_t> held_;
-  std::vector<std::int8_t> is_active_, active_in_row_;
-  std::vector<std::array<int, NC>> contact_of_slot_;            ///< -1 where none fills it
-  std::vector<double> start_, duration_;                        ///< s, of the stages
-  std::vector<std::array<unsigned, kMaxContacts>> remembered_;  ///< bits: faces active in the last solution
-  std::vector<double> remembered_end_;                          ///< s, of its stages
-  double remembered_shift_ = 0.0;                               ///< s, from its first stage to now
+  std::vector<Status> status_;
+  std::vector<std::int8_t> active_in_row_;
+  std::vector<std::array<int, NC>> contact_of_slot_;  ///< -1 where none fills it
+  std::vector<double> start_, duration_;              ///< s, of the stages
+  struct Remembered {
+    unsigned faces = 0;  ///< bits: active in the last solution
+    double multiplier[kFaces];
+  };
+  std::vector<std::array<Remembered, kMaxContacts>> remembered_;
+  std::vector<double> remembered_end_;  ///< s, of its stages
+  double remembered_shift_ = 0.0;       ///< s, from its first stage to now
   bool any_remembered_ = false;
+  StateMatrix terminal_cost_ = StateMatrix::Zero();
+  bool is_positive_ = true;  ///< definite, terminal_cost_ (or zero)
   Workspace<NC> w_{};
 };
 
 constexpr double kExact = 1e-6;  // N, residuals of a solution that is exact but for rounding
 constexpr int kMaxRefinements = 2;
-constexpr double kActive = 1e-5;           // of a constraint that counts as active, relative to the typical force
+constexpr double kCountsAsActive = 1e-5;   // of a constraint that counts as active, relative to the typical force
 constexpr int kMaxCondensedContacts = 40;  // of all stages, up to which OSQP is faster without the states
 
 Settings fallback_settings(Settings settings, Sizes sizes) {
@@ -362,7 +395,7 @@ class Engine final : public ForceQp {
     }
     solution.status = solve_inspected(problem, solution);
     if (solution.status == QpStatus::kSolved) {
-      solution.active = count_active(problem, 0, solution.forces.front(), kActive * typical_force_);
+      solution.active = count_active(problem, 0, solution.forces.front(), kCountsAsActive * typical_force_);
       return solution.status;
     }
     reset();

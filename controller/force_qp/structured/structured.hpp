@@ -93,8 +93,8 @@ class StructuredSolver {
   virtual void take_ahead() noexcept = 0;
   /// Revisions, passes and steps of the last solve; 0 where the first guess was right.
   virtual int iterations() const noexcept = 0;
-  /// Whether the last solve ended in 0, by revisions of the whole set.
-  virtual bool ended_by_revision() const noexcept = 0;
+  /// Whether the last solve held faces in its factor.
+  virtual bool holds() const noexcept = 0;
   /// f_0..f_(N-1), N, of the last solve; exactly zero in swing.
   virtual void forces(std::vector<ForceVector>& out) const noexcept = 0;
   /// The next solve starts from no active constraint.

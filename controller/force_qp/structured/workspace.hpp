@@ -39,9 +39,13 @@ struct Stage {
 template <int NC>
 struct Gain {
   static constexpr int kPairs = (NC + 1) / 2;
+  bool moves;  ///< false where held faces leave no force free: K is zero, K_columns are not set
   Lanes K_pose[3 * NC], K_rate[3 * NC];  ///< rows of K
   Lanes K_columns[NC][6];  ///< of each contact's rows: columns theta_j (low half) and p_j, omega_j and v_j (high half)
   Lanes Quu_inverse[kPairs][3 * NC];  ///< columns
+  // Where faces are held, what they leave out of the above:
+  Lanes Quu[kPairs][3 * NC];                 ///< columns
+  Lanes Qux_pose[3 * NC], Qux_rate[3 * NC];  ///< rows
 };
 
 /// A symmetric 12 x 12 matrix in 6 x 6 blocks of columns: lanes are the rows, pose or rate.
@@ -49,18 +53,31 @@ struct Cost {
   Lanes pose_pose[6], pose_rate[6], rate_pose[6], rate_rate[6];
 };
 
-/// A constraint c_i f <= b_i of one contact: c_i f = side f[side_at] + up f[up_at].
+/// A constraint c_i f <= b_i of one contact, or the multiplier of one that is held, from the gradient of that contact:
+/// n' (s[at], s[at + padded_rows], s[at + 2 padded_rows]) of a state s.
 struct Constraint {
-  double side, up;
+  double n[3];
   double bound;
-  int side_at, up_at;
+  int at;
   int id;  ///< kFaces row + face
+};
+
+/// What the solver does with a constraint.
+enum Status : std::int8_t { kIdle = 0, kActive = 1, kReleased = 2 };
+
+/// Columns of constraints, kept as long as their factor.
+struct Columns {
+  int max, num;
+  int* of;          ///< the column of constraint i, -1 where it has none
+  int* constraint;  ///< the other way round
+  double* values;   ///< max x length
 };
 
 enum class Outcome : std::int8_t { kSolved, kOutOfBudget, kSingular };
 
 /// All memory of an engine. Arrays over contacts ("rows") have one entry for each slot of each stage, padded to a
-/// multiple of eight with contacts of bounds 0; vectors of forces have x of every row, then y, then z.
+/// multiple of eight with contacts of bounds 0; vectors of forces have x of every row, then y, then z. A state is the
+/// forces, and after them, where faces are held, the gradient.
 template <int NC>
 struct Workspace {
   // The problem
@@ -77,52 +94,63 @@ struct Workspace {
   double* fz_max;
   Cost terminal;  ///< P, or Q of the last stage
   // The factor
+  bool factor_stands;
   Gain<NC>* gains;  ///< num_stages
   // The factor within faces that are held
-  std::uint8_t* held;  ///< padded_rows, a bit a face
-  bool ends_held;      ///< the last solution was found within held faces, not by the active set
+  bool holds;               ///< the solution is a step from the minimiser within held faces, not from the free one
+  bool held_factor_stands;  ///< that of `held`
+  int held_rows;            ///< with a status of their own, for being held
+  double* side;             ///< 3 padded_rows: 1, -1 or 0, the sign of the face of x, y, fz that is held
+  double* still;            ///< 3 padded_rows: 1 where that face is held still, 0 where it is released
+  double* to_zero;          ///< 3 padded_rows: at which step its multiplier reaches zero
+  std::uint8_t* held;       ///< padded_rows, a bit a face: of opposite faces at most one
+  std::uint8_t* next_held;
   Gain<NC>* held_gains;
   Cost* held_costs;  ///< num_stages, the cost-to-go of x_k, Q included
-  double* gradient;  ///< 3 padded_rows
   // One sweep
   Lanes* z_pose;  ///< num_stages, x_ref's distance to the nominal path
   Lanes* z_rate;
   Lanes* feedforward;  ///< num_stages x pairs
-  // Columns H^-1 c_i, kept as long as the factor
-  int max_columns, num_columns;
-  int ahead;               ///< constraints before this one have their columns
-  int* column_of;          ///< of constraint i, -1 where it has none
-  int* column_constraint;  ///< the other way round
-  double* columns;         ///< max_columns x 3 padded_rows
-  Lanes* eight_forces;     ///< 3 padded_rows, right-hand sides in the lanes
+  // Columns, of the factor and of that within held faces
+  Columns free_columns, held_columns;
+  int ahead;            ///< constraints before this one have their columns
+  Lanes* eight_states;  ///< 6 padded_rows, right-hand sides in the lanes
   Lanes* eight_feedforward;
-  // The active set
+  Lanes* eight_right;
+  // The active set, or what has changed of the held one
   int max_active, stride;  ///< of L_inverse's rows
   int active;
   Constraint* constraint;  ///< max_active
-  double* multiplier;
-  double* excess;  ///< c_i u0 - b_i
+  double* sign;            ///< of its pivot: 1, and -1 where it is released
+  double* multiplier;      ///< or by how far a released one is off its face, N
+  double* excess;          ///< c_i u0 - b_i
   const double** column;
-  std::int8_t* is_active;  ///< kFaces x padded_rows
+  Status* status;  ///< kFaces x padded_rows
   std::int8_t* active_in_row;
-  double* L_inverse;  ///< of L L' = C_A H^-1 C_A'
-  double* right;      ///< stride
+  double* L_inverse;
+  double* right;  ///< stride
   double* half;
   double* direction;
-  // The iterate
-  double* free_forces;  ///< u0, 3 padded_rows
-  double* forces;       ///< u
-  double* violation;    ///< padded_rows
-  int* candidates;      ///< kFaces x padded_rows
+  // The iterate: states
+  double* start;  ///< of the minimiser from which the columns lead
+  double* state;
+  double* way;
+  double* before;     ///< 3 padded_rows
+  double* violation;  ///< padded_rows
+  int* candidates;    ///< kFaces x padded_rows
   int num_guesses;
   int* guesses;  ///< constraints to begin with
+  double* guess_multiplier;
+  double* last_multiplier;  ///< of active constraints
   int iterations;
 };
 
 /// The compiled path for one machine and one number of contacts.
 template <int NC>
 struct Path {
-  /// Factors the stages; false where Quu is not positive definite. Forgets all columns.
+  /// To be called after the stages have changed: forgets factors and columns.
+  void (*take_stages)(Workspace<NC>&) noexcept;
+  /// Factors the stages, which else waits until a solve asks for it; false where Quu is not positive definite.
   bool (*factor)(Workspace<NC>&) noexcept;
   /// Takes eight columns that no solve has asked for yet, as far as there is room.
   void (*take_ahead)(Workspace<NC>&) noexcept;
