@@ -13,6 +13,9 @@ constexpr int kManyChanges = 48;  // of a set that is held, before another is
 constexpr int kMaxHolds = 30;
 constexpr int kColumnRoom = 64;          // of columns that a step may ask for
 constexpr double kDependent = 1e-11;     // of a constraint's own curvature: what is left of it below this is nothing
+constexpr double kRounding = 30.0;       // of the tolerance: violations that may be no more than rounding ..
+constexpr int kMaxInRounding = 5;        // .. if they do not go
+constexpr double kCancelled = 1e-8;      // of a sum of squares of either sign: too little to trust
 constexpr double kNoMultiplier = 1e-13;  // change of a multiplier that counts as none
 constexpr double kNever = 1e300;         // a step that no multiplier stops
 constexpr double kExactlyActive = 1e-4;  // of the tolerance: an active constraint is met to this, or refined
@@ -38,6 +41,7 @@ class ActiveSet {
       sweep<false>(w, nullptr, nullptr, w.start);
       begin_with_guesses();
     }
+    int in_rounding = 0;
     for (;;) {
       Outcome outcome = ascend();
       if (outcome != Outcome::kSolved) return outcome;
@@ -48,6 +52,7 @@ class ActiveSet {
       }
       const double worst = scan();
       if (!(worst > w.tolerance)) break;  // a number that is none is caught by the independent check
+      if (worst <= kRounding * w.tolerance && ++in_rounding > kMaxInRounding) break;  // so is this, and refined
       if (w.iterations == w.max_iterations) return Outcome::kOutOfBudget;
       ++w.iterations;
       if (!append_block(worst)) outcome = step(most_violated(worst), worst);
@@ -181,7 +186,9 @@ class ActiveSet {
     if (holds_ == kMaxHolds) return false;
     if (lost_) return true;
     if (!w.holds) return w.active > kManyGuesses;
-    return w.active > kManyChanges || w.held_columns.num + kColumnRoom > w.held_columns.max;
+    const Columns& columns = w.held_columns;
+    const bool is_full = columns.max < kFaces * w.rows && columns.num + kColumnRoom > columns.max;
+    return w.active > kManyChanges || is_full;
   }
 
   /// Holds `next_held` instead of what is held or active now: the minimiser within it in `start`, and in `state` the
@@ -301,11 +308,13 @@ class ActiveSet {
     set_status(w.constraint[j].id, w.sign[j] < 0.0 ? kActive : kIdle);
     const double sign = w.sign[j];
     // half: column j from row j on; right: the norms of its first entries
+    double size = 0.0;
     double squares = 0.0;
     for (int i = j; i < k; ++i) {
       const double x = row_of_L_inverse(i)[j];
+      size += x * x;
       squares += sign * w.sign[i] * (x * x);
-      lost_ = lost_ || !(squares > 0.0);
+      lost_ = lost_ || !(squares > kCancelled * size);
       w.half[i] = x;
       w.right[i] = __builtin_sqrt(squares);
     }
@@ -367,8 +376,8 @@ class ActiveSet {
         lost_ = true;
       }
     }
-    go(1.0);
-    if (!w.holds) combine();
+    for (int a = 0; a < w.active; ++a) w.multiplier[a] -= w.direction[a];
+    combine();
     return Outcome::kSolved;
   }
 

@@ -14,8 +14,9 @@ namespace structured {
 namespace {
 
 constexpr double kTolerance = 1e-10;  // of a violation that counts as none, relative to the typical force
-constexpr int kMaxColumns = 1024;     // that are kept, and constraints that may be active
+constexpr int kMaxColumns = 1024;     // that are kept
 constexpr int kMaxHeldColumns = 192;  // within held faces
+constexpr int kMaxActive = 192;       // constraints, besides those that are held
 
 constexpr int padded(int count) { return (count + 7) / 8 * 8; }
 
@@ -64,7 +65,7 @@ class Solver final : public StructuredSolver {
         max_rows_(static_cast<std::size_t>(padded(sizes.num_stages * NC))),
         max_columns_(std::min(kFaces * max_rows_, static_cast<std::size_t>(kMaxColumns))),
         max_held_columns_(std::min(kFaces * max_rows_, static_cast<std::size_t>(kMaxHeldColumns))),
-        max_active_(std::min(3 * max_rows_, max_columns_)),
+        max_active_(std::min(kFaces * max_rows_, static_cast<std::size_t>(kMaxActive))),
         stages_(num_stages(), Stage<NC>{}),
         gains_(num_stages(), Gain<NC>{}),
         held_gains_(num_stages(), Gain<NC>{}),
