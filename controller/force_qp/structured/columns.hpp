@@ -82,19 +82,36 @@ void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* o
     rights[at] = r;
   }
   const int last = rights[0].stage;
-  // Those of one stage: normals of free constraints, ways off held ones
+  // What those of one stage add: n to su; off a held face also t to the forces, -Quu t to su and -Qux't to p
   struct Beginning {
-    bool any_normal, any_off;
-    Vec normal[3 * NC], off[3 * NC];
+    Vec off[3 * NC], su[3 * NC], p[12];
+    bool any_off;
   } begins;
-  const auto begin_at = [&](const Stage<NC>& s, int from, int to) noexcept {
-    begins.any_normal = begins.any_off = false;
-    for (int c = 0; c < 3 * s.slots; ++c) begins.normal[c] = begins.off[c] = zeros();
+  const auto sum_up = [&](const Stage<NC>& s, int from, int to) noexcept {
+    begins.any_off = false;
+    for (int c = 0; c < 3 * s.slots; ++c) begins.su[c] = begins.off[c] = zeros();
     for (int i = from; i < to; ++i) {
       const Right& r = rights[i];
-      Vec* sum = (r.off ? begins.off : begins.normal) + 3 * r.slot;
+      Vec* sum = (r.off ? begins.off : begins.su) + 3 * r.slot;
       for (int d = 0; d < 3; ++d) sum[d] = add_product(sum[d], all(r.n[d]), load(kLane[r.lane]));
-      (r.off ? begins.any_off : begins.any_normal) = true;
+      begins.any_off = begins.any_off || r.off;
+    }
+  };
+  const auto begin_at = [&](const Stage<NC>& s, const Gain<NC>& gain, int from, int to) noexcept {
+    sum_up(s, from, to);
+    if (!begins.any_off) return;
+    const int U = 3 * s.slots;
+    for (int c = 0; c < U; ++c) {
+      for (int e = 0; e < U; ++e) {
+        begins.su[c] = subtract_product(begins.su[c], entry(gain.Quu[c / 6][e], c % 6), begins.off[e]);
+      }
+    }
+    for (int i = 0; i < 6; ++i) {
+      begins.p[i] = begins.p[6 + i] = zeros();
+      for (int c = 0; c < U; ++c) {
+        begins.p[i] = subtract_product(begins.p[i], entry(gain.Qux_pose[c], i), begins.off[c]);
+        begins.p[6 + i] = subtract_product(begins.p[6 + i], entry(gain.Qux_rate[c], i), begins.off[c]);
+      }
     }
   };
 
@@ -107,7 +124,7 @@ void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* o
     const int begin = next;
     while (next < count && rights[next].stage == k) ++next;
     const bool any_begins = begin < next;
-    if (any_begins) begin_at(s, begin, next);
+    if (any_begins) begin_at(s, gain, begin, next);
     with_slots(s, [&]<int M>() noexcept {
       constexpr int U = 3 * M;
       Vec su[U];
@@ -116,15 +133,8 @@ void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* o
         for (int i = 1; i < 6; ++i) a = add_product(a, entry(s.B[c], i), p[6 + i]);
         su[c] = a;
       }
-      if (any_begins && begins.any_normal) {
-        for (int c = 0; c < U; ++c) su[c] = su[c] + begins.normal[c];
-      }
-      if (any_begins && begins.any_off) {
-        for (int c = 0; c < U; ++c) {
-          for (int e = 0; e < U; ++e) {
-            su[c] = subtract_product(su[c], entry(gain.Quu[c / 6][e], c % 6), begins.off[e]);
-          }
-        }
+      if (any_begins) {
+        for (int c = 0; c < U; ++c) su[c] = su[c] + begins.su[c];
       }
       for (int c = 0; c < U; ++c) {
         Vec a = zeros();
@@ -153,12 +163,7 @@ void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* o
         }
       }
       if (any_begins && begins.any_off) {
-        for (int i = 0; i < 6; ++i) {
-          for (int c = 0; c < U; ++c) {
-            h[i] = subtract_product(h[i], entry(gain.Qux_pose[c], i), begins.off[c]);
-            h[6 + i] = subtract_product(h[6 + i], entry(gain.Qux_rate[c], i), begins.off[c]);
-          }
-        }
+        for (int i = 0; i < 12; ++i) h[i] = h[i] + begins.p[i];
       }
       for (int i = 0; i < 12; ++i) p[i] = h[i];
     });
@@ -173,7 +178,7 @@ void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* o
     const int end = next;
     while (next > 0 && rights[next - 1].stage == k) --next;
     const bool any_begins = kWithin && next < end;
-    if (any_begins) begin_at(s, next, end);
+    if (any_begins) sum_up(s, next, end);
     with_slots(s, [&]<int M>() noexcept {
       constexpr int U = 3 * M;
       Vec f[U];
@@ -203,7 +208,7 @@ void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* o
           }
           store(w.eight_states[(3 + c % 3) * padded + s.first_row + c / 3], d);
         }
-        if (any_begins && begins.any_off) {
+        if (any_begins) {
           for (int c = 0; c < U; ++c) f[c] = f[c] + begins.off[c];
         }
       }

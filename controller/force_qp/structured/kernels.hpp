@@ -9,7 +9,7 @@ constexpr int kMaxBlock = 32;     // constraints in one block
 constexpr int kPerContact = 3;    // active constraints of a contact, at most, when appended in blocks
 constexpr int kFewGuesses = 16;   // to begin with: more are held, where columns are to be made ..
 constexpr int kManyGuesses = 60;  // .. and where they are kept
-constexpr int kManyChanges = 48;  // of a set that is held, before another is
+constexpr int kManyChanges = 32;  // of a set that is held, before another is
 constexpr int kMaxHolds = 30;
 constexpr int kColumnRoom = 64;          // of columns that a step may ask for
 constexpr double kDependent = 1e-11;     // of a constraint's own curvature: what is left of it below this is nothing
@@ -110,6 +110,7 @@ class ActiveSet {
     return columns.values + static_cast<std::int64_t>(columns.of[i]) * length();
   }
   int length() const noexcept { return length_of_state(w); }
+  int gradients() const noexcept { return 3 * w.padded_rows; }  ///< where they begin in a state
   double* row_of_L_inverse(int a) noexcept { return w.L_inverse + static_cast<std::int64_t>(a) * w.stride; }
   int blocks() const noexcept { return (w.active + 7) / 8; }
 
@@ -201,8 +202,8 @@ class ActiveSet {
     w.held_rows = w.rows;
     forget(w.held_columns);
     if (!hold(w)) return false;
-    // A guess that is far off
-    while (holds_ == 1 && keep_positive(w) > kManyNegative && w.iterations < w.max_iterations) {
+    // Where so much has changed at once, many are to be let go
+    while (holds_ == 2 && keep_positive(w) > kManyNegative && w.iterations < w.max_iterations) {
       ++w.iterations;
       if (!hold(w)) return false;
     }
@@ -361,8 +362,8 @@ class ActiveSet {
       for (int a = 0; a < w.active; ++a) w.right[a] = w.excess[a];
       solve_small();
       if (w.holds) {
-        subtract_columns(w.start, w.direction, w.way);
-        for (int i = 0; i < length(); i += 8) store(w.way + i, load(w.state + i) - load(w.way + i));
+        subtract_columns(w.start, w.direction, w.way, gradients());
+        for (int i = gradients(); i < length(); i += 8) store(w.way + i, load(w.state + i) - load(w.way + i));
       }
       for (int a = 0; a < w.active; ++a) w.direction[a] = w.multiplier[a] - w.direction[a];
       const Blocking first = blocking();
@@ -426,7 +427,7 @@ class ActiveSet {
   }
 
   /// to = from - V y
-  void subtract_columns(const double* from, const double* y, double* to) const noexcept {
+  void subtract_columns(const double* from, const double* y, double* to, int begin = 0) const noexcept {
     const int n = length();
     int a = 0;
     for (; a + 4 <= w.active; a += 4) {
@@ -435,7 +436,7 @@ class ActiveSet {
       const Vec y1 = all(y[a + 1]);
       const Vec y2 = all(y[a + 2]);
       const Vec y3 = all(y[a + 3]);
-      for (int i = 0; i < n; i += 8) {
+      for (int i = begin; i < n; i += 8) {
         Vec u = subtract_product(load(from + i), y0, load(v[0] + i));
         Vec t = y1 * load(v[1] + i);
         u = subtract_product(u, y2, load(v[2] + i));
@@ -447,11 +448,11 @@ class ActiveSet {
     for (; a < w.active; ++a) {
       const Vec ya = all(y[a]);
       const double* v = w.column[a];
-      for (int i = 0; i < n; i += 8) store(to + i, subtract_product(load(from + i), ya, load(v + i)));
+      for (int i = begin; i < n; i += 8) store(to + i, subtract_product(load(from + i), ya, load(v + i)));
       from = to;
     }
     if (from != to) {
-      for (int i = 0; i < n; i += 8) store(to + i, load(from + i));
+      for (int i = begin; i < n; i += 8) store(to + i, load(from + i));
     }
   }
   void combine() noexcept { subtract_columns(w.start, w.multiplier, w.state); }
@@ -654,7 +655,9 @@ class ActiveSet {
     for (int a = 0; a < w.active; ++a) w.multiplier[a] -= step * w.direction[a];
     if (!w.holds) return;
     const Vec t = all(step);
-    for (int i = 0; i < length(); i += 8) store(w.state + i, subtract_product(load(w.state + i), t, load(w.way + i)));
+    for (int i = gradients(); i < length(); i += 8) {
+      store(w.state + i, subtract_product(load(w.state + i), t, load(w.way + i)));
+    }
   }
   /// Lets go of a held constraint whose multiplier is zero.
   bool release(int i) noexcept {
@@ -693,9 +696,9 @@ class ActiveSet {
       }
       if (w.holds) {
         if (was_held) {
-          for (int at = 0; at < length(); at += 8) store(w.way + at, zeros());
+          for (int at = gradients(); at < length(); at += 8) store(w.way + at, zeros());
         }
-        subtract_columns(was_held ? w.way : v, w.direction, w.way);
+        subtract_columns(was_held ? w.way : v, w.direction, w.way, gradients());
       }
       const Blocking first = blocking();
       const double full_step = independent ? violation / rate : 0.0;
