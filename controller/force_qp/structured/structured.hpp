@@ -1,7 +1,6 @@
 #pragma once
-// The force QP by a dual active set over one Riccati factor: exact but for rounding, in work that is linear in the
-// horizon as long as few constraints are active; where many are, by revisions of whole sets, each linear in the
-// horizon.
+// The force QP by a dual active set over one Riccati factor: exact but for rounding. The faces that were active in the
+// last solution are held in the factor itself, and only what changes of them makes work beyond the horizon's.
 //
 // Stages k = 0..N-1, x = (pose | rate) with pose = (theta | p) and rate = (omega | v), forces f = (f_1 .. f_n):
 //
@@ -20,45 +19,49 @@
 //
 //   p_N = P_N z_N     su = B'p + R (f - fref)     kf = Quu^-1 su     p <- A'p - K'su + Q z     step = -kf - K dx
 //
-// Columns. With H the Hessian of the condensed problem and c_i f <= b_i its constraints, v_i = H^-1 c_i is the sweep
-//   with su = c_i at the constraint's own stage and zero elsewhere; eight constraints go together, in the lanes.
-//   They live as long as the factor: where the matrices stay from solve to solve, eight more are taken ahead in each.
-//
-// Active set A. The minimiser under c_i f = b_i, i in A, is u = u0 - sum_A y_i v_i with M y = C_A u0 - b_A,
-//   M = C_A H^-1 C_A' = L L'. Only L^-1 is kept. Appending i adds a row: with g = C_A v_i and r = M^-1 g it is
-//   (-r', 1) / sqrt(c_i v_i - g'r). Dropping j rotates rows until column j is zero but for one row, which goes.
-//
-//   1. Begin with the set of the last solve, moved to where each stage was then; append what depends on nothing
-//      appended yet, and drop negative multipliers until there are none.
-//   2. Up to 6 passes, each where at most 16 constraints are violated: append all (at most 3 of a contact), drop
-//      negative multipliers.
-//   3. Steps of Goldfarb and Idnani (Math. Programming 27, 1983): the most violated constraint i becomes active;
-//      direction r = M^-1 C_A v_i for the multipliers, full step to c_i u = b_i, or a partial one to where the first
-//      multiplier of A reaches zero, whose constraint is dropped. Until nothing is violated by more than 1e-10 m g.
-//   4. What rounding has left of the active constraints is taken out.
-//
-// Held faces. The work above grows with the square of A. The minimiser under c_i f = b_i can be had at the cost of a
-//   factor, whatever A is: the faces held at a contact leave f = t + T w, and within them recursion and sweep, from a
-//   nominal path on the faces, stand as they are but for Quu^-1, in whose place there is
+// Held faces G. The minimiser under c_i f = b_i, i in G, can be had at the cost of the free one: the faces held at a
+//   contact leave f = t + T w, and within them recursion and sweep, from a nominal path on the faces, stand as they are
+//   but for Quu^-1, in whose place there is
 //
 //     T (T'Quu T)^-1 T'        T = [kx 0 ex; 0 ky ey; 0 0 kz], k = 1 where no face fixes the component, else 0;
 //                              ex = +-mu where fx = +-mu fz is held and kz = 1, else 0; ey likewise; T = 0 at fz = 0
 //
-//   The multipliers follow from the gradient d = R (f - fref) + B'p of the minimiser: those of side faces are -+dx and
-//   -+dy, that of a bound of fz is +-(mu (their sum) - dz).
+//   Their multipliers follow from the gradient d = R (f - fref) + B'p: those of side faces are -+dx and -+dy, that of a
+//   bound of fz is +-(mu (their sum) - dz). At fz = 0 all sides hold; those that d pushes against have the names.
 //
-//   0. With more than 80 constraints to begin with, on two feet or more, and before 1 to 3: hold them, solve, let go of
-//      what has a negative multiplier, hold what is violated, factor again from the last stage that has changed back:
-//      a Newton method for the optimality conditions (Hintermueller, Ito and Kunisch, SIAM J. Optim. 13, 2003), which
-//      may cycle. From the 7th revision on only the first contact that is to change and three in four of the others
-//      may, others each time, which breaks most cycles. Where there is nothing to revise it is the solution; after 40
-//      revisions 1 to 3 begin from where 0 began, with the budget that is left.
+// Changes E of G: constraints i added, and constraints r of G released. With s = (f | d + C_E'y) the solution is
+//   s = s0 - sum_E u_e v_e from the minimiser s0 within G, and M u = N s0 - b, M = N V:
 //
-// Why it ends. Revisions in 0 are counted. Dropping in 1 and 2 shrinks a finite set, and passes are counted. Both leave
-//   the minimiser under A with no negative multiplier: a state that 3 may start from. Each full step of 3 raises the
-//   dual objective strictly, so no set comes twice; between two of them are no more partial ones than active
-//   constraints. Every problem that passes inspect() is feasible (f = fz_min along z), so the dual is bounded. A budget
-//   ends it all the same.
+//               u                              column v, a sweep with                            row n, its bound b
+//     added     its multiplier y_i             su = c_i at its own stage                         c_i f, b_i
+//     released  how far it is off its face:    f = tau at its own stage, c_r tau = 1, all other  -tau'd, its
+//               c_r f = b_r - u                faces of G still: su = -Quu tau, p -= Qux'tau     multiplier: 0
+//
+//   Eight columns go together, in the lanes. They live as long as the factor: where the matrices stay from solve to
+//   solve, and G is empty, eight more are taken ahead in each.
+//   M is symmetric, positive on what is added and negative on what is released: M = L S L', S = diag(+-1). Only L^-1 is
+//   kept. Appending e adds a row: with g = N v_e and r = M^-1 g it is (-r', 1) / sqrt(|n_e v_e - g'r|). Dropping j
+//   rotates rows until column j is zero but for one row, which goes: Givens rotations between equal signs, hyperbolic
+//   ones between others.
+//
+//   1. Begin with the set of the last solve, moved to where each stage was then, and its multipliers. Of more than a
+//   few
+//      constraints it becomes G; else G is empty and E the set.
+//   2. Ascend: from the multipliers, none of which is negative, towards those of the set's minimiser. The first to
+//      reach zero on the way leaves the set, is dropped or released; again, until the minimiser is reached.
+//   3. Where constraints are violated append all (at most 3 of a contact; of more than 32 those violated at least half
+//      as much as the worst), with multipliers of zero, and go to 2. Where none can be, as each depends on the set, a
+//      step of Goldfarb and Idnani (Math. Programming 27, 1983) for the worst: along it others reach zero and leave.
+//   4. Where E has become large, or rounding has spoilt L^-1, G becomes the set as it is, with its multipliers, E is
+//      empty, and 2 goes on; the first time, while more than 48 contacts have negative multipliers in the minimiser
+//      within G, they let go of these at once.
+//   5. Nothing is violated by more than 1e-10 m g. What rounding has left of the active constraints is taken out.
+//
+// Why it ends. The dual objective never falls: 2 moves towards its maximum over a set, 3 begins where 2 has ended, 4
+//   keeps the multipliers but where it lets go. In 2 sets only shrink. Where 2 has ended and something is violated, the
+//   objective rises with one of the appended constraints at least, or by a full step of 3: no set comes twice. 4 is
+//   done at most 30 times. Every problem that passes inspect() is feasible (f = fz_min along z), so the dual is
+//   bounded. A budget ends it all the same.
 //
 // Contacts in swing take no part: each stage has as many inputs as it has contacts in stance.
 //
