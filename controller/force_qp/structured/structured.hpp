@@ -44,9 +44,8 @@
 //   rotates rows until column j is zero but for one row, which goes: Givens rotations between equal signs, hyperbolic
 //   ones between others.
 //
-//   1. Begin with the set of the last solve, moved to where each stage was then, and its multipliers. Of more than a
-//   few
-//      constraints it becomes G; else G is empty and E the set.
+//   1. Begin with the set of the last solve, moved to where each stage was then, and its multipliers. More than a few
+//      constraints become G; else G is empty and E the set.
 //   2. Ascend: from the multipliers, none of which is negative, towards those of the set's minimiser. The first to
 //      reach zero on the way leaves the set, is dropped or released; again, until the minimiser is reached.
 //   3. Where constraints are violated append all (at most 3 of a contact; of more than 32 those violated at least half
