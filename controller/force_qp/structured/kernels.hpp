@@ -753,8 +753,7 @@ void take_stages(Workspace<NC>& w) noexcept {
   forget(w.free_columns);
   forget(w.held_columns);
   w.ahead = 0;
-  w.factor_stands = w.held_factor_stands = false;
-  for (int k = 0; k < w.num_stages; ++k) make_rows(w.stages[k]);
+  w.rows_stand = w.factor_stands = w.held_factor_stands = false;
 }
 template <int NC>
 Outcome solve(Workspace<NC>& w) noexcept {

@@ -402,13 +402,15 @@ bool factor(Workspace<NC>& w) noexcept {
   const Cost* next = &w.terminal;
   bool positive = true;
   for (int k = w.num_stages - 1; k >= 0 && positive; --k) {
-    const Stage<NC>& s = w.stages[k];
+    Stage<NC>& s = w.stages[k];
+    if (!w.rows_stand) make_rows(s);
     Cost& cost = costs[k % 2];
     with_slots(s, [&]<int M>() noexcept {
       positive = factor_stage<M, false>(w, s, k > 0 ? &w.stages[k - 1] : nullptr, *next, w.gains[k], cost);
     });
     next = &cost;
   }
+  w.rows_stand = w.rows_stand || positive;
   w.factor_stands = positive;
   return positive;
 }
@@ -418,7 +420,8 @@ template <int NC>
 bool factor_held(Workspace<NC>& w, int last) noexcept {
   bool positive = true;
   for (int k = last; k >= 0 && positive; --k) {
-    const Stage<NC>& s = w.stages[k];
+    Stage<NC>& s = w.stages[k];
+    if (!w.rows_stand) make_rows(s);
     const Cost& next = k + 1 < w.num_stages ? w.held_costs[k + 1] : w.terminal;
     const std::uint8_t* held = w.held + s.first_row;
     with_slots(s, [&]<int M>() noexcept {
@@ -429,6 +432,7 @@ bool factor_held(Workspace<NC>& w, int last) noexcept {
                      : factor_stage<M, false>(w, s, before, next, w.held_gains[k], w.held_costs[k]);
     });
   }
+  w.rows_stand = w.rows_stand || positive;
   return positive;
 }
 

@@ -94,6 +94,7 @@ struct Workspace {
   double* fz_max;
   Cost terminal;  ///< P, or Q of the last stage
   // The factor
+  bool rows_stand;  ///< of the stages: D_rows, C_rows, B_rows
   bool factor_stands;
   Gain<NC>* gains;  ///< num_stages
   // The factor within faces that are held
