@@ -7,6 +7,7 @@ namespace stance::force_qp::structured::STANCE_ISA {
 
 constexpr int kMaxBlock = 32;     // constraints in one block
 constexpr int kPerContact = 3;    // active constraints of a contact, at most, when appended in blocks
+constexpr int kMaxPasses = 6;     // without held faces, in which all that is negative is dropped at once
 constexpr int kFewGuesses = 16;   // to begin with: more are held, where columns are to be made ..
 constexpr int kManyGuesses = 60;  // .. and where they are kept
 constexpr int kManyChanges = 32;  // of a set that is held, before another is
@@ -42,12 +43,14 @@ class ActiveSet {
       begin_with_guesses();
     }
     int in_rounding = 0;
+    int passes = w.holds ? kMaxPasses : 0;
     for (;;) {
-      Outcome outcome = ascend();
+      Outcome outcome = passes++ < kMaxPasses ? settle() : ascend();
       if (outcome != Outcome::kSolved) return outcome;
       if (is_crowded()) {
         take_active();
         if (!begin_held()) return Outcome::kSingular;
+        passes = kMaxPasses;
         continue;
       }
       const double worst = scan();
@@ -351,6 +354,24 @@ class ActiveSet {
       w.column[i] = w.column[i + 1];
     }
     --w.active;
+  }
+
+  /// The minimiser of the active set, or of what is left of it: what has a negative multiplier is dropped at once.
+  Outcome settle() noexcept {
+    for (bool dropped = true; dropped;) {
+      for (int a = 0; a < w.active; ++a) w.right[a] = w.excess[a];
+      solve_small();
+      for (int a = 0; a < w.active; ++a) w.multiplier[a] = w.direction[a];
+      dropped = false;
+      for (int a = w.active - 1; a >= 0; --a) {
+        if (w.multiplier[a] < 0.0) {
+          drop(a);
+          dropped = true;
+        }
+      }
+    }
+    combine();
+    return Outcome::kSolved;
   }
 
   /// From multipliers none of which is negative to those of the active set, or of what is left of it: what reaches zero

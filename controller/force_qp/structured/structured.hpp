@@ -47,7 +47,8 @@
 //   1. Begin with the set of the last solve, moved to where each stage was then, and its multipliers. More than a few
 //      constraints become G; else G is empty and E the set.
 //   2. Ascend: from the multipliers, none of which is negative, towards those of the set's minimiser. The first to
-//      reach zero on the way leaves the set, is dropped or released; again, until the minimiser is reached.
+//      reach zero on the way leaves the set, is dropped or released; again, until the minimiser is reached. While G is
+//      empty, the first six times, all whose multipliers are negative there are dropped at once, until none is.
 //   3. Where constraints are violated append all (at most 3 of a contact; of more than 32 those violated at least half
 //      as much as the worst), with multipliers of zero, and go to 2. Where none can be, as each depends on the set, a
 //      step of Goldfarb and Idnani (Math. Programming 27, 1983) for the worst: along it others reach zero and leave.
@@ -56,11 +57,11 @@
 //      within G, they let go of these at once.
 //   5. Nothing is violated by more than 1e-10 m g. What rounding has left of the active constraints is taken out.
 //
-// Why it ends. The dual objective never falls: 2 moves towards its maximum over a set, 3 begins where 2 has ended, 4
-//   keeps the multipliers but where it lets go. In 2 sets only shrink. Where 2 has ended and something is violated, the
-//   objective rises with one of the appended constraints at least, or by a full step of 3: no set comes twice. 4 is
-//   done at most 30 times. Every problem that passes inspect() is feasible (f = fz_min along z), so the dual is
-//   bounded. A budget ends it all the same.
+// Why it ends. In 2 sets only shrink. But for what is dropped or let go at once, which is counted, the dual objective
+//   never falls: 2 moves towards its maximum over a set, 3 begins where 2 has ended, 4 keeps the multipliers. Where 2
+//   has ended and something is violated, it rises with one of the appended constraints at least, or by a full step of
+//   3: no set comes twice. 4 is done at most 30 times. Every problem that passes inspect() is feasible (f = fz_min
+//   along z), so the dual is bounded. A budget ends it all the same.
 //
 // Contacts in swing take no part: each stage has as many inputs as it has contacts in stance.
 //
