@@ -154,14 +154,6 @@ class ActiveSet {
     for (int row = 0; row < w.rows; ++row) {
       w.next_held[row] = holdable(w.next_held[row], w.before[row], w.before[w.padded_rows + row]);
     }
-    for (int k = 0; k < w.num_stages; ++k) {
-      const Stage<NC>& s = w.stages[k];
-      with_slots(s, [&]<int M>() noexcept {
-        Vec f[Stage<NC>::kPairs];
-        for (int pair = 0; 2 * pair < M; ++pair) f[pair] = load(s.f_ref[pair]);
-        scatter<M>(f, w.state, w.padded_rows, s.first_row);
-      });
-    }
   }
   /// The same of what is active now.
   void take_active() noexcept {

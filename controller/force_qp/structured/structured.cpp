@@ -217,7 +217,7 @@ class Solver final : public StructuredSolver {
 
   void reset() noexcept override {
     for (auto& stage : remembered_) {
-      for (Remembered& of : stage) of.faces = 0;
+      for (Remembered& of : stage) of = {};
     }
     any_remembered_ = false;
   }
@@ -284,8 +284,8 @@ class Solver final : public StructuredSolver {
     return is_positive_;
   }
 
-  /// The set to begin with: of each stage what was active at its middle in the last solution, whose stages began one
-  /// stage earlier.
+  /// The set to begin with, its multipliers, and the forces: of each stage what they were at its middle in the last
+  /// solution, whose stages began one stage earlier. A contact that did not stand then had none.
   void guess() noexcept {
     w_.num_guesses = 0;
     if (!any_remembered_) return;
@@ -297,10 +297,12 @@ class Solver final : public StructuredSolver {
         const int contact = contact_of_slot_[k][static_cast<std::size_t>(slot)];
         if (contact < 0) continue;
         const Remembered& of = remembered_[then][static_cast<std::size_t>(contact)];
+        const int row = stages_[k].first_row + slot;
+        for (int d = 0; d < 3; ++d) w_.state[d * w_.padded_rows + row] = of.force[d];
         for (int face = 0; face < kFaces; ++face) {
           if ((of.faces >> face & 1U) == 0U) continue;
           w_.guess_multiplier[w_.num_guesses] = of.multiplier[face];
-          guesses_[w_.num_guesses++] = kFaces * (stages_[k].first_row + slot) + face;
+          guesses_[w_.num_guesses++] = kFaces * row + face;
         }
       }
     }
@@ -308,21 +310,21 @@ class Solver final : public StructuredSolver {
 
   void remember() noexcept {
     if (any_remembered_) reset();
+    for (int row = 0; row < w_.rows && !any_remembered_; ++row) any_remembered_ = w_.active_in_row[row] > 0;
+    if (!any_remembered_) return;
     for (int row = 0; row < w_.rows; ++row) {
-      if (w_.active_in_row[row] == 0) continue;
       const auto k = static_cast<std::size_t>(w_.row_stage[row]);
       const int contact = contact_of_slot_[k][static_cast<std::size_t>(row - stages_[k].first_row)];
       if (contact < 0) continue;
       Remembered& of = remembered_[k][static_cast<std::size_t>(contact)];
-      for (int face = 0; face < kFaces; ++face) {
+      for (int d = 0; d < 3; ++d) of.force[d] = w_.state[d * w_.padded_rows + row];
+      for (int face = 0; face < kFaces && w_.active_in_row[row] > 0; ++face) {
         const int i = kFaces * row + face;
         if (w_.status[i] != kActive) continue;
         of.faces |= 1U << face;
         of.multiplier[face] = w_.last_multiplier[i];
       }
-      any_remembered_ = true;
     }
-    if (!any_remembered_) return;
     remembered_shift_ = duration_.front();
     for (std::size_t k = 0; k < num_stages(); ++k) remembered_end_[k] = start_[k] + duration_[k];
   }
@@ -348,7 +350,8 @@ class Solver final : public StructuredSolver {
   std::vector<double> start_, duration_;              ///< s, of the stages
   struct Remembered {
     unsigned faces = 0;  ///< bits: active in the last solution
-    double multiplier[kFaces];
+    double multiplier[kFaces] = {};
+    double force[3] = {};  ///< N
   };
   std::vector<std::array<Remembered, kMaxContacts>> remembered_;
   std::vector<double> remembered_end_;  ///< s, of its stages
