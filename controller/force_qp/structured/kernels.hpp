@@ -660,8 +660,8 @@ class ActiveSet {
     const double step = -largest(first_of_all);
     if (step == kNever || (first.any() && step >= first.step)) return first;
     int at = 0;
-    while (w.to_zero[at] != step) ++at;
-    first = {step, -1, held_constraint(at % P, at / P)};
+    while (at < 3 * P && w.to_zero[at] != step) ++at;
+    if (at < 3 * P) first = {step, -1, held_constraint(at % P, at / P)};  // else a number that is none
     return first;
   }
   void go(double step) noexcept {

@@ -216,9 +216,7 @@ class Solver final : public StructuredSolver {
   }
 
   void reset() noexcept override {
-    for (auto& stage : remembered_) {
-      for (Remembered& of : stage) of = {};
-    }
+    for (auto& stage : remembered_) std::fill_n(stage.begin(), sizes_.num_contacts, Remembered{});
     any_remembered_ = false;
   }
 
