@@ -105,6 +105,32 @@ TEST_CASE("ColumnsThatAreKeptGiveWhatNewOnesGive") {
   }
 }
 
+TEST_CASE("ColumnsTakenAheadLeaveRoomForThoseThatASolveAsksFor") {
+  std::mt19937_64 random(30);
+  const Problem base = standing(90, 4, 0.2);  // more constraints than there is room for columns
+  auto solver = make_structured_solver(base.sizes, kWeight, 1000);
+  auto fresh = make_structured_solver(base.sizes, kWeight, 1000);
+  Solution kept(base.sizes);
+  Solution other(base.sizes);
+  REQUIRE(solver->take_matrices(base));
+  REQUIRE(fresh->take_matrices(base));
+  for (int tick = 0; tick < 200; ++tick) solver->take_ahead();
+  for (int tick = 0; tick < 5; ++tick) {
+    Problem problem = base;
+    disturb(problem, 4.0, random);
+    solver->take_vectors(problem);
+    REQUIRE(solver->solve() == QpStatus::kSolved);
+    REQUIRE(solver->iterations() > 0);
+    solver->forces(kept.forces);
+    fresh->reset();
+    fresh->take_vectors(problem);
+    REQUIRE(fresh->solve() == QpStatus::kSolved);
+    fresh->forces(other.forces);
+    CHECK(force_error(kept.forces, other.forces) <= kUpdateTolerance);
+    solver->take_ahead();
+  }
+}
+
 TEST_CASE("ARepeatedProblemNeedsNoSecondSearch") {
   std::mt19937_64 random(24);
   Problem problem = standing(10, 2, 0.2);

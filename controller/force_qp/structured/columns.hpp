@@ -20,6 +20,14 @@ inline void forget(Columns& columns) noexcept {
   columns.num = 0;
 }
 
+constexpr int kColumnRoom = 64;  // for the columns that a step may ask for
+
+/// Whether there may soon be no room for columns that are wanted.
+template <int NC>
+inline bool is_short_of_room(const Workspace<NC>& w, const Columns& columns, int wanted) noexcept {
+  return columns.max < kFaces * w.rows && columns.num + wanted > columns.max;
+}
+
 /// c_i of constraint i at its own contact.
 inline void normal(int i, double friction, double (&c)[3]) noexcept {
   const int face = i % kFaces;
@@ -276,7 +284,7 @@ void take_ahead(Workspace<NC>& w) noexcept {
   int ids[8];
   int count = 0;
   const Columns& columns = w.free_columns;
-  const int room = columns.max - columns.num;
+  const int room = is_short_of_room(w, columns, kColumnRoom + 8) ? 0 : columns.max - columns.num;
   for (; w.ahead < kFaces * w.rows && count < 8 && count < room; ++w.ahead) {
     const int row = w.ahead / kFaces;
     const bool can_bind = w.fz_max[row] > 0.0 && (w.ahead % kFaces < kFaces - 1 || w.fz_min[row] > 0.0);

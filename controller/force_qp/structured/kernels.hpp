@@ -12,7 +12,6 @@ constexpr int kFewGuesses = 16;   // to begin with: more are held, where columns
 constexpr int kManyGuesses = 60;  // .. and where they are kept
 constexpr int kManyChanges = 32;  // of a set that is held, before another is
 constexpr int kMaxHolds = 30;
-constexpr int kColumnRoom = 64;          // of columns that a step may ask for
 constexpr double kDependent = 1e-11;     // of a constraint's own curvature: what is left of it below this is nothing
 constexpr double kRounding = 30.0;       // of the tolerance: violations that may be no more than rounding ..
 constexpr int kMaxInRounding = 5;        // .. if they do not go
@@ -45,7 +44,12 @@ class ActiveSet {
     int in_rounding = 0;
     int passes = w.holds ? kMaxPasses : 0;
     for (;;) {
-      Outcome outcome = passes++ < kMaxPasses ? settle() : ascend();
+      Outcome outcome = Outcome::kSolved;
+      if (passes++ < kMaxPasses) {
+        settle();
+      } else {
+        outcome = ascend();
+      }
       if (outcome != Outcome::kSolved) return outcome;
       if (is_crowded()) {
         take_active();
@@ -117,16 +121,12 @@ class ActiveSet {
   double* row_of_L_inverse(int a) noexcept { return w.L_inverse + static_cast<std::int64_t>(a) * w.stride; }
   int blocks() const noexcept { return (w.active + 7) / 8; }
 
-  void clear_changes() noexcept {
+  void clear() noexcept {
     for (int a = 0; a < w.active; ++a) {
-      double* row = row_of_L_inverse(a);
-      for (int b = 0; b <= a / 8; ++b) store(row + 8 * b, zeros());
+      set_status(w.constraint[a].id, kIdle);
+      for (int b = 0; b <= a / 8; ++b) store(row_of_L_inverse(a) + 8 * b, zeros());
     }
     w.active = 0;
-  }
-  void clear() noexcept {
-    for (int a = 0; a < w.active; ++a) set_status(w.constraint[a].id, kIdle);
-    clear_changes();
     for (int row = 0; row < w.held_rows; ++row) {
       for (int face = 0; face < kFaces; ++face) w.status[kFaces * row + face] = kIdle;
       w.active_in_row[row] = 0;
@@ -182,9 +182,7 @@ class ActiveSet {
     if (holds_ == kMaxHolds) return false;
     if (lost_) return true;
     if (!w.holds) return w.active > kManyGuesses;
-    const Columns& columns = w.held_columns;
-    const bool is_full = columns.max < kFaces * w.rows && columns.num + kColumnRoom > columns.max;
-    return w.active > kManyChanges || is_full;
+    return w.active > kManyChanges || is_short_of_room(w, w.held_columns, kColumnRoom);
   }
 
   /// Holds `next_held` instead of what is held or active now: the minimiser within it in `start`, and in `state` the
@@ -197,7 +195,7 @@ class ActiveSet {
     w.held_rows = w.rows;
     forget(w.held_columns);
     if (!hold(w)) return false;
-    // Where so much has changed at once, many are to be let go
+    // Where so much has changed since the first set, many are to be let go
     while (holds_ == 2 && keep_positive(w) > kManyNegative && w.iterations < w.max_iterations) {
       ++w.iterations;
       if (!hold(w)) return false;
@@ -349,7 +347,7 @@ class ActiveSet {
   }
 
   /// The minimiser of the active set, or of what is left of it: what has a negative multiplier is dropped at once.
-  Outcome settle() noexcept {
+  void settle() noexcept {
     for (bool dropped = true; dropped;) {
       for (int a = 0; a < w.active; ++a) w.right[a] = w.excess[a];
       solve_small();
@@ -363,7 +361,6 @@ class ActiveSet {
       }
     }
     combine();
-    return Outcome::kSolved;
   }
 
   /// From multipliers none of which is negative to those of the active set, or of what is left of it: what reaches zero
@@ -428,12 +425,11 @@ class ActiveSet {
   }
 
   void begin_with_guesses() noexcept {
-    if (w.num_guesses == 0) return;
-    if (w.free_columns.max - w.free_columns.num < w.num_guesses) {
+    if (is_short_of_room(w, w.free_columns, w.num_guesses + kColumnRoom)) {
       forget(w.free_columns);
       w.ahead = 0;
     }
-    if (!take_columns(w, w.guesses, w.num_guesses)) return;
+    if (w.num_guesses == 0 || !take_columns(w, w.guesses, w.num_guesses)) return;
     for (int i = 0; i < w.num_guesses; ++i) {
       if (try_append(w.guesses[i])) w.multiplier[w.active - 1] = w.guess_multiplier[i];
     }
@@ -688,12 +684,22 @@ class ActiveSet {
   /// reach zero on the way are dropped.
   Outcome step(int i, double violation) noexcept {
     const bool was_held = w.status[i] == kReleased;
-    if (!fetch(i)) return Outcome::kOutOfBudget;
+    // An active one is violated by rounding alone; where there is no column there is no room for it
+    if (w.status[i] == kActive || !fetch(i)) {
+      lost_ = true;
+      return Outcome::kSolved;  // and the set is held anew
+    }
     const double* v = column_of(i);
     const Constraint c = constraint_of(i);
     const double curvature = along(c, v);
     double multiplier = 0.0;
     for (;;) {
+      if (lost_) {  // as above; what has been taken of the multiplier goes back
+        for (int d = 0; d < 3 && w.holds && !was_held; ++d) {
+          w.state[gradients() + c.at + d * w.padded_rows] -= c.n[d] * multiplier;
+        }
+        return Outcome::kSolved;
+      }
       double rate = 0.0;  // at which the violation shrinks with the multiplier
       bool independent = false;
       if (was_held) {
@@ -727,7 +733,6 @@ class ActiveSet {
         if (!w.holds) combine();
         return Outcome::kSolved;
       }
-      if (lost_) return Outcome::kSolved;  // and the set is held anew
       if (!first.any()) return Outcome::kSingular;
       if (w.iterations == w.max_iterations) return Outcome::kOutOfBudget;
       ++w.iterations;
@@ -758,7 +763,7 @@ class ActiveSet {
 
   Workspace<NC>& w;
   int holds_ = 0;      ///< sets held in this solve
-  bool lost_ = false;  ///< what L_inverse was, to rounding
+  bool lost_ = false;  ///< the way on, to rounding or for want of room: the set is to be held anew
 };
 
 template <int NC>

@@ -37,8 +37,8 @@
 //     released  how far it is off its face:    f = tau at its own stage, c_r tau = 1, all other  -tau'd, its
 //               c_r f = b_r - u                faces of G still: su = -Quu tau, p -= Qux'tau     multiplier: 0
 //
-//   Eight columns go together, in the lanes. They live as long as the factor: where the matrices stay from solve to
-//   solve, and G is empty, eight more are taken ahead in each.
+//   Eight columns go together, in the lanes. They live as long as their factor: where the matrices stay from solve to
+//   solve, eight more of the free one, which has no G, are taken ahead in each.
 //   M is symmetric, positive on what is added and negative on what is released: M = L S L', S = diag(+-1). Only L^-1 is
 //   kept. Appending e adds a row: with g = N v_e and r = M^-1 g it is (-r', 1) / sqrt(|n_e v_e - g'r|). Dropping j
 //   rotates rows until column j is zero but for one row, which goes: Givens rotations between equal signs, hyperbolic
@@ -50,12 +50,14 @@
 //      reach zero on the way leaves the set, is dropped or released; again, until the minimiser is reached. While G is
 //      empty, the first six times, all whose multipliers are negative there are dropped at once, until none is.
 //   3. Where constraints are violated append all (at most 3 of a contact; of more than 32 those violated at least half
-//      as much as the worst), with multipliers of zero, and go to 2. Where none can be, as each depends on the set, a
-//      step of Goldfarb and Idnani (Math. Programming 27, 1983) for the worst: along it others reach zero and leave.
+//      as much as the worst, 32 at most), with multipliers of zero, and go to 2. Where none can be, as each depends on
+//      the set, a step of Goldfarb and Idnani (Math. Programming 27, 1983) for the worst: along it others reach zero
+//      and leave.
 //   4. Where E has become large, or rounding has spoilt L^-1, G becomes the set as it is, with its multipliers, E is
-//      empty, and 2 goes on; the first time, while more than 48 contacts have negative multipliers in the minimiser
-//      within G, they let go of these at once.
-//   5. Nothing is violated by more than 1e-10 m g. What rounding has left of the active constraints is taken out.
+//      empty, and 2 goes on; the second time that a set is held, while more than 48 contacts have negative multipliers
+//      in the minimiser within G, they let go of these at once.
+//   5. Nothing is violated by more than 1e-10 m g (30 times that, where it does not go). What rounding has left of the
+//   active constraints is taken out.
 //
 // Why it ends. In 2 sets only shrink. But for what is dropped or let go at once, which is counted, the dual objective
 //   never falls: 2 moves towards its maximum over a set, 3 begins where 2 has ended, 4 keeps the multipliers. Where 2
@@ -94,7 +96,7 @@ class StructuredSolver {
   virtual void refine() noexcept = 0;
   /// To be called where the next problem has the same matrices: takes eight more columns.
   virtual void take_ahead() noexcept = 0;
-  /// Revisions, passes and steps of the last solve; 0 where the first guess was right.
+  /// Rounds, and constraints that left the set on the way, of the last solve; 0 where the first guess was right.
   virtual int iterations() const noexcept = 0;
   /// Whether the last solve held faces in its factor.
   virtual bool holds() const noexcept = 0;
