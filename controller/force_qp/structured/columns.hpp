@@ -5,10 +5,15 @@
 
 namespace stance::force_qp::structured::STANCE_ISA {
 
+/// Where the gradients begin in a state.
+template <int NC>
+inline int gradients_of_state(const Workspace<NC>& w) noexcept {
+  return 3 * w.padded_rows;
+}
 /// How many numbers a state has.
 template <int NC>
 inline int length_of_state(const Workspace<NC>& w) noexcept {
-  return (w.holds ? 6 : 3) * w.padded_rows;
+  return (w.holds ? 2 : 1) * gradients_of_state(w);
 }
 template <int NC>
 inline Columns& columns_of(Workspace<NC>& w) noexcept {

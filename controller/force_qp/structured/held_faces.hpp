@@ -54,7 +54,7 @@ int keep_positive(Workspace<NC>& w) noexcept {
   for (int row = 0; row < w.rows; ++row) {
     w.next_held[row] = w.held[row];
     if (w.held[row] == 0) continue;
-    const double* d = w.state + 3 * w.padded_rows + row;
+    const double* d = w.state + gradients_of_state(w) + row;
     if (Held(w.held[row], w.fz_min[row]).apex) w.held[row] = apex_with_sides(d[0], d[w.padded_rows]);
     const Held h(w.held[row], w.fz_min[row]);
     double y[3];
@@ -83,7 +83,7 @@ bool hold(Workspace<NC>& w) noexcept {
   if (!w.held_factor_stands) return false;
   lie_on_faces(w);
   sweep<true>(w, w.state, nullptr, w.state);
-  gradient_at<NC>(w, w.state, w.state + 3 * w.padded_rows);
+  gradient_at<NC>(w, w.state, w.state + gradients_of_state(w));
   return true;
 }
 

@@ -32,7 +32,6 @@ class ActiveSet {
     w.iterations = 0;
     clear();
     w.holds = w.num_guesses > (w.free_columns.num == 0 ? kFewGuesses : kManyGuesses);
-    holds_ = 0;
     if (w.holds) {
       take_guesses();
       if (!begin_held()) return Outcome::kSingular;
@@ -73,17 +72,15 @@ class ActiveSet {
   void refine() noexcept {
     // pull = C_A' y
     double* pull = w.way;
-    for (int i = 0; i < 3 * w.padded_rows; ++i) pull[i] = 0.0;
+    for (int i = 0; i < gradients(); ++i) pull[i] = 0.0;
     for (int a = 0; a < w.active; ++a) {
-      if (w.sign[a] < 0.0) continue;
-      const Constraint& c = w.constraint[a];
-      for (int d = 0; d < 3; ++d) pull[c.at + d * w.padded_rows] += c.n[d] * w.multiplier[a];
+      if (w.sign[a] > 0.0) add_normal(pull, w.constraint[a].id, w.multiplier[a]);
     }
-    const int forces = 3 * w.padded_rows;
     (w.holds ? sweep<true, NC> : sweep<false, NC>)(w, w.state, pull, w.state);
     if (w.holds) {
-      gradient_at<NC>(w, w.state, w.state + forces);
-      for (int i = 0; i < forces; ++i) w.state[forces + i] += pull[i];
+      double* gradient = w.state + gradients();
+      gradient_at<NC>(w, w.state, gradient);
+      for (int i = 0; i < gradients(); ++i) gradient[i] += pull[i];
     }
     correct_rounding();
   }
@@ -98,7 +95,7 @@ class ActiveSet {
     if (is_held(w, id)) {
       way_off(id, Held(w.held[row], w.fz_min[row]), w.friction, c.n);
       for (double& n : c.n) n = -n;
-      c.at = 3 * w.padded_rows + row;
+      c.at = gradients() + row;
       c.bound = 0.0;
     } else {
       normal(id, w.friction, c.n);
@@ -117,7 +114,7 @@ class ActiveSet {
     return columns.values + static_cast<std::int64_t>(columns.of[i]) * length();
   }
   int length() const noexcept { return length_of_state(w); }
-  int gradients() const noexcept { return 3 * w.padded_rows; }  ///< where they begin in a state
+  int gradients() const noexcept { return gradients_of_state(w); }
   double* row_of_L_inverse(int a) noexcept { return w.L_inverse + static_cast<std::int64_t>(a) * w.stride; }
   int blocks() const noexcept { return (w.active + 7) / 8; }
 
@@ -145,11 +142,11 @@ class ActiveSet {
   /// What to hold, and the gradients that its multipliers come from, as the last solution had them.
   void take_guesses() noexcept {
     for (int row = 0; row < w.padded_rows; ++row) w.next_held[row] = 0;
-    for (int i = 0; i < 3 * w.padded_rows; ++i) w.before[i] = 0.0;
+    for (int i = 0; i < gradients(); ++i) w.before[i] = 0.0;
     for (int i = 0; i < w.num_guesses; ++i) {
       std::uint8_t& next = w.next_held[w.guesses[i] / kFaces];
       next = static_cast<std::uint8_t>(next | 1U << (w.guesses[i] % kFaces));
-      pull_back(w.guesses[i], w.guess_multiplier[i]);
+      add_normal(w.before, w.guesses[i], -w.guess_multiplier[i]);
     }
     for (int row = 0; row < w.rows; ++row) {
       w.next_held[row] = holdable(w.next_held[row], w.before[row], w.before[w.padded_rows + row]);
@@ -157,10 +154,9 @@ class ActiveSet {
   }
   /// The same of what is active now.
   void take_active() noexcept {
-    const int forces = 3 * w.padded_rows;
-    for (int i = 0; i < forces; ++i) w.before[i] = w.holds ? w.state[forces + i] : 0.0;
+    for (int i = 0; i < gradients(); ++i) w.before[i] = w.holds ? w.state[gradients() + i] : 0.0;
     for (int a = 0; a < w.active; ++a) {
-      if (w.sign[a] > 0.0) pull_back(w.constraint[a].id, w.multiplier[a]);
+      if (w.sign[a] > 0.0) add_normal(w.before, w.constraint[a].id, -w.multiplier[a]);
     }
     for (int row = 0; row < w.padded_rows; ++row) {
       unsigned faces = 0;
@@ -170,11 +166,11 @@ class ActiveSet {
       w.next_held[row] = holdable(faces, w.before[row], w.before[w.padded_rows + row]);
     }
   }
-  /// before -= c_i y
-  void pull_back(int i, double multiplier) noexcept {
+  /// to += c_i y
+  void add_normal(double* to, int i, double y) const noexcept {
     double n[3];
     normal(i, w.friction, n);
-    for (int d = 0; d < 3; ++d) w.before[i / kFaces + d * w.padded_rows] -= n[d] * multiplier;
+    for (int d = 0; d < 3; ++d) to[i / kFaces + d * w.padded_rows] += n[d] * y;
   }
 
   /// Whether so much has changed that it pays to hold the set as it is and begin again.
@@ -201,7 +197,7 @@ class ActiveSet {
       if (!hold(w)) return false;
     }
     for (int i = 0; i < length(); i += 8) store(w.start + i, load(w.state + i));
-    for (int i = 0; i < 3 * w.padded_rows; i += 8) {
+    for (int i = 0; i < gradients(); i += 8) {
       store(w.side + i, zeros());
       store(w.still + i, zeros());
     }
@@ -219,9 +215,9 @@ class ActiveSet {
         if (!(y[axis] > 0.0)) y[axis] = 0.0;
         if (sides[axis] == 0) continue;
         w.side[axis * w.padded_rows + row] = sides[axis];
-        set_status(kFaces * row + held_face(h, axis), kActive);
+        set_status(held_constraint(row, axis), kActive);
       }
-      double* d = w.state + 3 * w.padded_rows + row;
+      double* d = w.state + gradients() + row;
       d[0] = -h.x * y[0];
       d[w.padded_rows] = -h.y * y[1];
       d[2 * w.padded_rows] = w.friction * (y[0] + y[1]) - h.z * y[2];
@@ -392,20 +388,21 @@ class ActiveSet {
     return Outcome::kSolved;
   }
 
-  static constexpr int held_face(const Held& h, int axis) noexcept {
-    return 2 * axis + static_cast<int>((axis == 0 ? h.x : axis == 1 ? h.y : h.z) < 0);
+  /// The constraint of contact `row` that is held along an axis, where one is.
+  int held_constraint(int row, int axis) const noexcept {
+    return kFaces * row + 2 * axis + static_cast<int>(w.side[axis * w.padded_rows + row] < 0.0);
   }
-  bool is_untouched_apex(int row, const Held& h) const noexcept {
-    const Status* status = w.status + kFaces * row;
-    return h.apex && status[held_face(h, 0)] == kActive && status[held_face(h, 1)] == kActive && status[5] == kActive;
+  bool is_untouched_apex(int row) const noexcept {
+    bool untouched = Held(w.held[row], w.fz_min[row]).apex;
+    for (int axis = 0; axis < 3; ++axis) untouched = untouched && w.status[held_constraint(row, axis)] == kActive;
+    return untouched;
   }
   /// At the apex both sides hold: the other one takes the name, and the multiplier with its sign turned.
-  void turn_side(int row, const Held& h, int axis) noexcept {
-    const int face = held_face(h, axis);
+  void turn_side(int row, int axis) noexcept {
+    set_status(held_constraint(row, axis), kIdle);
     w.held[row] = static_cast<std::uint8_t>(w.held[row] ^ (3U << (2 * axis)));
     w.side[axis * w.padded_rows + row] = -w.side[axis * w.padded_rows + row];
-    set_status(kFaces * row + face, kIdle);
-    set_status(kFaces * row + (face ^ 1), kActive);
+    set_status(held_constraint(row, axis), kActive);
     for (int i = 0; i < kFaces; ++i) w.held_columns.of[kFaces * row + i] = -1;
   }
 
@@ -416,9 +413,9 @@ class ActiveSet {
       if (w.held[row] == 0) continue;
       const Held h(w.held[row], w.fz_min[row]);
       double y[3];
-      held_multipliers(h, w.friction, w.padded_rows, w.state + 3 * w.padded_rows + row, y);
+      held_multipliers(h, w.friction, w.padded_rows, w.state + gradients() + row, y);
       for (int axis = 0; axis < 3; ++axis) {
-        const int i = kFaces * row + held_face(h, axis);
+        const int i = held_constraint(row, axis);
         if (w.status[i] == kActive) w.last_multiplier[i] = y[axis];
       }
     }
@@ -603,9 +600,6 @@ class ActiveSet {
     }
     return take(wanted);
   }
-  int held_constraint(int row, int axis) const noexcept {
-    return kFaces * row + 2 * axis + static_cast<int>(w.side[axis * w.padded_rows + row] < 0.0);
-  }
 
   /// What stops a step: an active constraint, or one that is held, whose multiplier reaches zero.
   struct Blocking {
@@ -630,8 +624,8 @@ class ActiveSet {
     }
     if (!w.holds) return first;
     const int P = w.padded_rows;
-    const double* d = w.state + 3 * P;
-    const double* rate_of_d = w.way + 3 * P;
+    const double* d = w.state + gradients();
+    const double* rate_of_d = w.way + gradients();
     const Vec friction = all(w.friction);
     const Vec least = all(kNoMultiplier);
     const Vec never = all(kNever);
@@ -672,9 +666,8 @@ class ActiveSet {
   bool release(int i) noexcept {
     const int row = i / kFaces;
     const int axis = i % kFaces / 2;
-    const Held h(w.held[row], w.fz_min[row]);
-    if (axis < 2 && is_untouched_apex(row, h)) {
-      turn_side(row, h, axis);
+    if (axis < 2 && is_untouched_apex(row)) {
+      turn_side(row, axis);
       return true;
     }
     return fetch_held(i) && try_append(i);
