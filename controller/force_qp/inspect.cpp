@@ -1,6 +1,7 @@
 #include "controller/force_qp/inspect.hpp"
 
 #include <cmath>
+#include <cstring>
 
 namespace stance::force_qp {
 namespace {
@@ -16,9 +17,11 @@ template <typename X>
 bool all_zero(const Eigen::MatrixBase<X>& x) noexcept {
   return x.cwiseAbs().sum() == 0.0;
 }
-template <typename X, typename Y>
-bool same(const Eigen::MatrixBase<X>& x, const Eigen::MatrixBase<Y>& y) noexcept {
-  return all_zero(x - y);
+/// To the bit, for which the C library has the machine's widest compare.
+template <typename X>
+bool same(const X& x, const X& y) noexcept {
+  return x.size() == y.size() &&
+         std::memcmp(x.data(), y.data(), sizeof(double) * static_cast<std::size_t>(x.size())) == 0;
 }
 
 /// One where A = [I 0 D 0; 0 I 0 E; 0 C I 0; 0 0 0 I] has an entry of the identity, zero in D, E and C.
@@ -30,19 +33,20 @@ const StateMatrix kFixed = [] {
   return fixed;
 }();
 
-bool has_structure(const StateMatrix& A) noexcept {
-  return all_zero((A - StateMatrix::Identity()).cwiseProduct(kFixed));
-}
+const StateMatrix kIdentity = StateMatrix::Identity();
+
+/// Times zero, what is not finite is a NaN: an A with this structure is finite, in D, E and C too.
+bool has_structure(const StateMatrix& A) noexcept { return all_zero((A - kIdentity).cwiseProduct(kFixed)); }
 
 bool is_valid(const StageData& stage, int num_contacts) noexcept {
   const Dynamics& dynamics = stage.dynamics;
   const int num_forces = 3 * num_contacts;
   if (dynamics.B.cols() != num_forces || stage.f_ref.size() != num_forces || stage.R.size() != num_forces) return false;
-  if (!all_finite(dynamics.A) || !all_finite(dynamics.B) || !all_finite(dynamics.g) || !all_finite(stage.x_ref) ||
+  if (!has_structure(dynamics.A) || !all_zero(dynamics.B.topRows<6>())) return false;
+  if (!all_finite(dynamics.B.bottomRows<6>()) || !all_finite(dynamics.g) || !all_finite(stage.x_ref) ||
       !all_finite(stage.f_ref) || !all_finite(stage.Q) || !all_finite(stage.R)) {
     return false;
   }
-  if (!has_structure(dynamics.A) || !all_zero(dynamics.B.topRows<6>())) return false;
   if (!(stage.R.minCoeff() > 0.0) || !(stage.Q.minCoeff() >= 0.0)) return false;
   for (std::size_t c = 0; c < static_cast<std::size_t>(num_contacts); ++c) {
     if (!std::isfinite(stage.fz_min[c]) || !std::isfinite(stage.fz_max[c]) || stage.fz_min[c] > stage.fz_max[c]) {
