@@ -5,7 +5,7 @@
 #include <stdexcept>
 
 #include "controller/force_qp/osqp_engine.hpp"
-#include "controller/force_qp/structured/structured.hpp"
+#include "controller/force_qp/structured_engine.hpp"
 
 namespace stance::force_qp {
 namespace {

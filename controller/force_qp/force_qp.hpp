@@ -6,8 +6,7 @@
 //        |fx|, |fy| <= mu fz,   fz_min <= fz <= fz_max         for each contact and stage; fz_max = 0 in swing
 //
 // A and B have the structure of centroidal.hpp. Sizes and sparsity are frozen at set-up: a contact change alters bounds
-// and values, never dimensions. What the engines do is told in osqp_engine.hpp and
-// structured/structured.hpp.
+// and values, never dimensions. What the engines do is told in structured_engine.hpp and osqp_engine.hpp.
 #include <memory>
 #include <vector>
 

@@ -4,7 +4,7 @@
 #include <limits>
 
 #include "controller/force_qp/osqp_engine.hpp"
-#include "controller/force_qp/structured/structured.hpp"
+#include "controller/force_qp/structured_engine.hpp"
 #include "tests/force_qp/problems.hpp"
 #include "tests/force_qp/reference_solver.hpp"
 

@@ -1,5 +1,5 @@
 // The structured engine where it differs from the others: any model of the structure, any schedule, every path.
-#include "controller/force_qp/structured/structured.hpp"
+#include "controller/force_qp/structured_engine.hpp"
 
 #include <Eigen/QR>
 #include <algorithm>

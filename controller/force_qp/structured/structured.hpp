@@ -81,12 +81,12 @@ enum class Simd : std::int8_t { kPortable = 0, kAvx2 = 1, kAvx512 = 2 };
 const std::vector<Simd>& available_simd();
 const char* name(Simd simd) noexcept;
 
-/// The solver without inspection and certificate: for problems that have passed inspect(). Engines are made by
-/// make_force_qp.
+/// The solver without inspection and check, which structured_engine.hpp puts around it: for problems that have passed
+/// inspect().
 class StructuredSolver {
  public:
   virtual ~StructuredSolver() = default;
-  /// Takes A, B, Q, R, P, mu and the bounds over, and factors. False where the cost is not convex.
+  /// Takes A, B, Q, R, P, mu and the bounds over. False where the cost is not convex.
   virtual bool take_matrices(const Problem& problem) noexcept = 0;
   /// Takes x0, g and the references over.
   virtual void take_vectors(const Problem& problem) noexcept = 0;
@@ -109,15 +109,5 @@ class StructuredSolver {
 /// `typical_force` [N] scales what counts as violated. Takes all memory.
 std::unique_ptr<StructuredSolver> make_structured_solver(Sizes sizes, double typical_force, int max_iterations,
                                                          Simd simd = available_simd().back());
-
-/// The engine: inspection, solver, independent check. What the check finds not exact is refined; where that does not
-/// help, or the solver gives up, OSQP solves the same problem in at most `settings.fallback_iterations` and what the
-/// time left affords (osqp_engine.hpp), and the solution says that it was OSQP. Where OSQP fails too, the status is
-/// OSQP's; where it may not begin, it is the solver's. A problem that inspection refuses reaches neither.
-std::unique_ptr<ForceQp> make_structured_engine(const Settings& settings, Sizes sizes, double typical_force,
-                                                Simd simd = available_simd().back());
-/// The same around any solver: what the engine trusts is the check.
-std::unique_ptr<ForceQp> make_structured_engine(const Settings& settings, Sizes sizes, double typical_force,
-                                                std::unique_ptr<StructuredSolver> solver);
 
 }  // namespace stance::force_qp

@@ -73,6 +73,17 @@ struct Columns {
   double* values;   ///< max x length
 };
 
+/// M = L S L' of the active set; see signed_factor.hpp. Vectors have `stride` entries.
+struct SignedFactor {
+  int stride;  ///< of L_inverse's rows
+  int size;
+  double* L_inverse;
+  double* sign;   ///< S
+  double* right;  ///< of what is solved for
+  double* half;
+  double* direction;
+};
+
 enum class Outcome : std::int8_t { kSolved, kOutOfBudget, kSingular };
 
 /// All memory of an engine. Arrays over contacts ("rows") have one entry for each slot of each stage, padded to a
@@ -119,19 +130,14 @@ struct Workspace {
   Lanes* eight_feedforward;
   Lanes* eight_right;
   // The active set, or what has changed of the held one
-  int max_active, stride;  ///< of L_inverse's rows
-  int active;
+  int max_active;
+  SignedFactor M;          ///< sign -1 where a constraint is released
   Constraint* constraint;  ///< max_active
-  double* sign;            ///< of its pivot: 1, and -1 where it is released
   double* multiplier;      ///< or by how far a released one is off its face, N
   double* excess;          ///< c_i u0 - b_i
   const double** column;
   Status* status;  ///< kFaces x padded_rows
   std::int8_t* active_in_row;
-  double* L_inverse;
-  double* right;  ///< stride
-  double* half;
-  double* direction;
   // The iterate: states
   double* start;  ///< of the minimiser from which the columns lead
   double* state;
