@@ -69,15 +69,16 @@ struct Right {
   bool off;
   double n[3];  ///< at its contact
 };
+/// What those of one stage add: n to su; off a held face also t to the forces, -Quu t to su and -Qux't to p.
+template <int NC>
+struct Beginning {
+  Vec off[3 * NC], su[3 * NC], p[12];
+  bool any_off;
+};
 
-/// Eight columns at once: sweeps with the constraints in the lanes. Of a free constraint the states that answer to
-/// su = c_i at its own stage; of one that is held those that answer to one newton off it, gradients included.
+/// The right-hand sides of `ids`, the latest first.
 template <bool kWithin, int NC>
-void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* out) noexcept {
-  const Gain<NC>* gains = kWithin ? w.held_gains : w.gains;
-  const int N = w.num_stages;
-  const int padded = w.padded_rows;
-  Right rights[8];  // the latest first
+inline void take_rights(const Workspace<NC>& w, const int* ids, int count, Right (&rights)[8]) noexcept {
   for (int j = 0; j < count; ++j) {
     const int row = ids[j] / kFaces;
     Right r;
@@ -94,40 +95,45 @@ void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* o
     for (; at > 0 && rights[at - 1].stage < r.stage; --at) rights[at] = rights[at - 1];
     rights[at] = r;
   }
-  const int last = rights[0].stage;
-  // What those of one stage add: n to su; off a held face also t to the forces, -Quu t to su and -Qux't to p
-  struct Beginning {
-    Vec off[3 * NC], su[3 * NC], p[12];
-    bool any_off;
-  } begins;
-  const auto sum_up = [&](const Stage<NC>& s, int from, int to) noexcept {
-    begins.any_off = false;
-    for (int c = 0; c < 3 * s.slots; ++c) begins.su[c] = begins.off[c] = zeros();
-    for (int i = from; i < to; ++i) {
-      const Right& r = rights[i];
-      Vec* sum = (r.off ? begins.off : begins.su) + 3 * r.slot;
-      for (int d = 0; d < 3; ++d) sum[d] = add_product(sum[d], all(r.n[d]), load(kLane[r.lane]));
-      begins.any_off = begins.any_off || r.off;
-    }
-  };
-  const auto begin_at = [&](const Stage<NC>& s, const Gain<NC>& gain, int from, int to) noexcept {
-    sum_up(s, from, to);
-    if (!begins.any_off) return;
-    const int U = 3 * s.slots;
-    for (int c = 0; c < U; ++c) {
-      for (int e = 0; e < U; ++e) {
-        begins.su[c] = subtract_product(begins.su[c], entry(gain.Quu[c / 6][e], c % 6), begins.off[e]);
-      }
-    }
-    for (int i = 0; i < 6; ++i) {
-      begins.p[i] = begins.p[6 + i] = zeros();
-      for (int c = 0; c < U; ++c) {
-        begins.p[i] = subtract_product(begins.p[i], entry(gain.Qux_pose[c], i), begins.off[c]);
-        begins.p[6 + i] = subtract_product(begins.p[6 + i], entry(gain.Qux_rate[c], i), begins.off[c]);
-      }
-    }
-  };
+}
 
+template <int NC>
+inline void sum_up(const Stage<NC>& s, const Right* rights, int from, int to, Beginning<NC>& begins) noexcept {
+  begins.any_off = false;
+  for (int c = 0; c < 3 * s.slots; ++c) begins.su[c] = begins.off[c] = zeros();
+  for (int i = from; i < to; ++i) {
+    const Right& r = rights[i];
+    Vec* sum = (r.off ? begins.off : begins.su) + 3 * r.slot;
+    for (int d = 0; d < 3; ++d) sum[d] = add_product(sum[d], all(r.n[d]), load(kLane[r.lane]));
+    begins.any_off = begins.any_off || r.off;
+  }
+}
+template <int NC>
+inline void begin_at(const Stage<NC>& s, const Gain<NC>& gain, const Right* rights, int from, int to,
+                     Beginning<NC>& begins) noexcept {
+  sum_up(s, rights, from, to, begins);
+  if (!begins.any_off) return;
+  const int U = 3 * s.slots;
+  for (int c = 0; c < U; ++c) {
+    for (int e = 0; e < U; ++e) {
+      begins.su[c] = subtract_product(begins.su[c], entry(gain.Quu[c / 6][e], c % 6), begins.off[e]);
+    }
+  }
+  for (int i = 0; i < 6; ++i) {
+    begins.p[i] = begins.p[6 + i] = zeros();
+    for (int c = 0; c < U; ++c) {
+      begins.p[i] = subtract_product(begins.p[i], entry(gain.Qux_pose[c], i), begins.off[c]);
+      begins.p[6 + i] = subtract_product(begins.p[6 + i], entry(gain.Qux_rate[c], i), begins.off[c]);
+    }
+  }
+}
+
+/// The costates, and from them what `sweep_forth` needs of each stage.
+template <bool kWithin, int NC>
+inline void sweep_back(Workspace<NC>& w, const Right* rights, int count) noexcept {
+  const Gain<NC>* gains = kWithin ? w.held_gains : w.gains;
+  const int last = rights[0].stage;
+  Beginning<NC> begins;
   Vec p[12];
   for (Vec& a : p) a = zeros();
   int next = 0;
@@ -137,7 +143,7 @@ void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* o
     const int begin = next;
     while (next < count && rights[next].stage == k) ++next;
     const bool any_begins = begin < next;
-    if (any_begins) begin_at(s, gain, begin, next);
+    if (any_begins) begin_at(s, gain, rights, begin, next, begins);
     with_slots(s, [&]<int M>() noexcept {
       constexpr int U = 3 * M;
       Vec su[U];
@@ -181,17 +187,25 @@ void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* o
       for (int i = 0; i < 12; ++i) p[i] = h[i];
     });
   }
+}
 
+/// The states, into eight_states.
+template <bool kWithin, int NC>
+inline void sweep_forth(Workspace<NC>& w, const Right* rights, int count) noexcept {
+  const Gain<NC>* gains = kWithin ? w.held_gains : w.gains;
+  const int last = rights[0].stage;
+  const int padded = w.padded_rows;
+  Beginning<NC> begins;
   Vec x[12];
   for (Vec& a : x) a = zeros();
-  next = count;
-  for (int k = 0; k < N; ++k) {
+  int next = count;
+  for (int k = 0; k < w.num_stages; ++k) {
     const Stage<NC>& s = w.stages[k];
     const Gain<NC>& gain = gains[k];
     const int end = next;
     while (next > 0 && rights[next - 1].stage == k) --next;
     const bool any_begins = kWithin && next < end;
-    if (any_begins) sum_up(s, next, end);
+    if (any_begins) sum_up(s, rights, next, end, begins);
     with_slots(s, [&]<int M>() noexcept {
       constexpr int U = 3 * M;
       Vec f[U];
@@ -244,9 +258,19 @@ void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* o
       for (int i = 0; i < 12; ++i) x[i] = y[i];
     });
   }
+}
+
+/// Eight columns at once: sweeps with the constraints in the lanes. Of a free constraint the states that answer to
+/// su = c_i at its own stage; of one that is held those that answer to one newton off it, gradients included.
+template <bool kWithin, int NC>
+void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* out) noexcept {
+  Right rights[8];
+  take_rights<kWithin>(w, ids, count, rights);
+  sweep_back<kWithin>(w, rights, count);
+  sweep_forth<kWithin>(w, rights, count);
   const int length = length_of_state(w);
-  for (int at = 0; at < length; at += padded) {
-    for (int row = w.rows; row < padded; ++row) store(w.eight_states[at + row], zeros());
+  for (int at = 0; at < length; at += w.padded_rows) {
+    for (int row = w.rows; row < w.padded_rows; ++row) store(w.eight_states[at + row], zeros());
   }
   for (int at = 0; at < length; at += 8) {
     Vec t[8];
