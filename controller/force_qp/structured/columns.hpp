@@ -70,9 +70,9 @@ struct Right {
   double n[3];  ///< at its contact
 };
 /// What those of one stage add: n to su; off a held face also t to the forces, -Quu t to su and -Qux't to p.
-template <int NC>
+template <typename V, int NC>
 struct Beginning {
-  Vec off[3 * NC], su[3 * NC], p[12];
+  V off[3 * NC], su[3 * NC], p[12];
   bool any_off;
 };
 
@@ -97,45 +97,45 @@ inline void take_rights(const Workspace<NC>& w, const int* ids, int count, Right
   }
 }
 
-template <int NC>
-inline void sum_up(const Stage<NC>& s, const Right* rights, int from, int to, Beginning<NC>& begins) noexcept {
+template <typename V, int NC>
+inline void sum_up(const Stage<NC>& s, const Right* rights, int from, int to, Beginning<V, NC>& begins) noexcept {
   begins.any_off = false;
-  for (int c = 0; c < 3 * s.slots; ++c) begins.su[c] = begins.off[c] = zeros();
+  for (int c = 0; c < 3 * s.slots; ++c) begins.su[c] = begins.off[c] = zeros<V>();
   for (int i = from; i < to; ++i) {
     const Right& r = rights[i];
-    Vec* sum = (r.off ? begins.off : begins.su) + 3 * r.slot;
-    for (int d = 0; d < 3; ++d) sum[d] = add_product(sum[d], all(r.n[d]), load(kLane[r.lane]));
+    V* sum = (r.off ? begins.off : begins.su) + 3 * r.slot;
+    for (int d = 0; d < 3; ++d) sum[d] = add_product(sum[d], all<V>(r.n[d]), load<V>(kLane[r.lane]));
     begins.any_off = begins.any_off || r.off;
   }
 }
-template <int NC>
+template <typename V, int NC>
 inline void begin_at(const Stage<NC>& s, const Gain<NC>& gain, const Right* rights, int from, int to,
-                     Beginning<NC>& begins) noexcept {
+                     Beginning<V, NC>& begins) noexcept {
   sum_up(s, rights, from, to, begins);
   if (!begins.any_off) return;
   const int U = 3 * s.slots;
   for (int c = 0; c < U; ++c) {
     for (int e = 0; e < U; ++e) {
-      begins.su[c] = subtract_product(begins.su[c], entry(gain.Quu[c / 6][e], c % 6), begins.off[e]);
+      begins.su[c] = subtract_product(begins.su[c], entry<V>(gain.Quu[c / 6][e], c % 6), begins.off[e]);
     }
   }
   for (int i = 0; i < 6; ++i) {
-    begins.p[i] = begins.p[6 + i] = zeros();
+    begins.p[i] = begins.p[6 + i] = zeros<V>();
     for (int c = 0; c < U; ++c) {
-      begins.p[i] = subtract_product(begins.p[i], entry(gain.Qux_pose[c], i), begins.off[c]);
-      begins.p[6 + i] = subtract_product(begins.p[6 + i], entry(gain.Qux_rate[c], i), begins.off[c]);
+      begins.p[i] = subtract_product(begins.p[i], entry<V>(gain.Qux_pose[c], i), begins.off[c]);
+      begins.p[6 + i] = subtract_product(begins.p[6 + i], entry<V>(gain.Qux_rate[c], i), begins.off[c]);
     }
   }
 }
 
 /// The costates, and from them what `sweep_forth` needs of each stage.
-template <bool kWithin, int NC>
+template <typename V, bool kWithin, int NC>
 inline void sweep_back(Workspace<NC>& w, const Right* rights, int count) noexcept {
   const Gain<NC>* gains = kWithin ? w.held_gains : w.gains;
   const int last = rights[0].stage;
-  Beginning<NC> begins;
-  Vec p[12];
-  for (Vec& a : p) a = zeros();
+  Beginning<V, NC> begins;
+  V p[12];
+  for (V& a : p) a = zeros<V>();
   int next = 0;
   for (int k = last; k >= 0; --k) {
     const Stage<NC>& s = w.stages[k];
@@ -146,39 +146,39 @@ inline void sweep_back(Workspace<NC>& w, const Right* rights, int count) noexcep
     if (any_begins) begin_at(s, gain, rights, begin, next, begins);
     with_slots(s, [&]<int M>() noexcept {
       constexpr int U = 3 * M;
-      Vec su[U];
+      V su[U];
       for (int c = 0; c < U; ++c) {
-        Vec a = entry(s.B[c], 0) * p[6];
-        for (int i = 1; i < 6; ++i) a = add_product(a, entry(s.B[c], i), p[6 + i]);
+        V a = entry<V>(s.B[c], 0) * p[6];
+        for (int i = 1; i < 6; ++i) a = add_product(a, entry<V>(s.B[c], i), p[6 + i]);
         su[c] = a;
       }
       if (any_begins) {
         for (int c = 0; c < U; ++c) su[c] = su[c] + begins.su[c];
       }
       for (int c = 0; c < U; ++c) {
-        Vec a = zeros();
-        for (int e = 0; e < U; ++e) a = add_product(a, entry(gain.Quu_inverse[c / 6][e], c % 6), su[e]);
+        V a = zeros<V>();
+        for (int e = 0; e < U; ++e) a = add_product(a, entry<V>(gain.Quu_inverse[c / 6][e], c % 6), su[e]);
         store(w.eight_feedforward[k * 3 * NC + c], a);
       }
       for (int c = 0; c < U && kWithin; ++c) store(w.eight_right[k * 3 * NC + c], su[c]);
       if (k == 0) return;
-      Vec h[12];
+      V h[12];
       for (int i = 0; i < 6; ++i) {
         const int block = i / 3 * 3;
         h[i] = p[i];
-        Vec a = p[6 + i];
-        for (int j = 0; j < 3; ++j) a = add_product(a, all(s.D[i - block].v[lane_of(block + j)]), p[block + j]);
+        V a = p[6 + i];
+        for (int j = 0; j < 3; ++j) a = add_product(a, all<V>(s.D[i - block].v[lane_of(block + j)]), p[block + j]);
         h[6 + i] = a;
       }
       if (s.coupled) {
         for (int j = 0; j < 3; ++j) {
-          for (int i = 0; i < 3; ++i) h[3 + j] = add_product(h[3 + j], all(s.C[j].v[i]), p[6 + i]);
+          for (int i = 0; i < 3; ++i) h[3 + j] = add_product(h[3 + j], all<V>(s.C[j].v[i]), p[6 + i]);
         }
       }
       for (int i = 0; i < 6; ++i) {
         for (int c = 0; c < U; ++c) {
-          h[i] = subtract_product(h[i], entry(gain.K_pose[c], i), su[c]);
-          h[6 + i] = subtract_product(h[6 + i], entry(gain.K_rate[c], i), su[c]);
+          h[i] = subtract_product(h[i], entry<V>(gain.K_pose[c], i), su[c]);
+          h[6 + i] = subtract_product(h[6 + i], entry<V>(gain.K_rate[c], i), su[c]);
         }
       }
       if (any_begins && begins.any_off) {
@@ -190,14 +190,14 @@ inline void sweep_back(Workspace<NC>& w, const Right* rights, int count) noexcep
 }
 
 /// The states, into eight_states.
-template <bool kWithin, int NC>
+template <typename V, bool kWithin, int NC>
 inline void sweep_forth(Workspace<NC>& w, const Right* rights, int count) noexcept {
   const Gain<NC>* gains = kWithin ? w.held_gains : w.gains;
   const int last = rights[0].stage;
   const int padded = w.padded_rows;
-  Beginning<NC> begins;
-  Vec x[12];
-  for (Vec& a : x) a = zeros();
+  Beginning<V, NC> begins;
+  V x[12];
+  for (V& a : x) a = zeros<V>();
   int next = count;
   for (int k = 0; k < w.num_stages; ++k) {
     const Stage<NC>& s = w.stages[k];
@@ -208,13 +208,13 @@ inline void sweep_forth(Workspace<NC>& w, const Right* rights, int count) noexce
     if (any_begins) sum_up(s, rights, next, end, begins);
     with_slots(s, [&]<int M>() noexcept {
       constexpr int U = 3 * M;
-      Vec f[U];
+      V f[U];
       for (int c = 0; c < U; ++c) {
-        Vec a = k <= last ? load(w.eight_feedforward[k * 3 * NC + c]) : zeros();
-        Vec b = zeros();
+        V a = k <= last ? load<V>(w.eight_feedforward[k * 3 * NC + c]) : zeros<V>();
+        V b = zeros<V>();
         for (int i = 0; i < 6; ++i) {
-          a = subtract_product(a, entry(gain.K_pose[c], i), x[i]);
-          b = add_product(b, entry(gain.K_rate[c], i), x[6 + i]);
+          a = subtract_product(a, entry<V>(gain.K_pose[c], i), x[i]);
+          b = add_product(b, entry<V>(gain.K_rate[c], i), x[6 + i]);
         }
         f[c] = a - b;
       }
@@ -222,14 +222,14 @@ inline void sweep_forth(Workspace<NC>& w, const Right* rights, int count) noexce
         unsigned any = 0;
         for (int slot = 0; slot < M; ++slot) any |= w.held[s.first_row + slot];
         for (int c = 0; c < U; ++c) {
-          Vec d = zeros();
+          V d = zeros<V>();
           if (any != 0) {
-            Vec e = zeros();
-            if (k <= last) d = d - load(w.eight_right[k * 3 * NC + c]);
-            for (int j = 0; j < U; ++j) d = add_product(d, entry(gain.Quu[c / 6][j], c % 6), f[j]);
+            V e = zeros<V>();
+            if (k <= last) d = d - load<V>(w.eight_right[k * 3 * NC + c]);
+            for (int j = 0; j < U; ++j) d = add_product(d, entry<V>(gain.Quu[c / 6][j], c % 6), f[j]);
             for (int i = 0; i < 6; ++i) {
-              d = add_product(d, entry(gain.Qux_pose[c], i), x[i]);
-              e = add_product(e, entry(gain.Qux_rate[c], i), x[6 + i]);
+              d = add_product(d, entry<V>(gain.Qux_pose[c], i), x[i]);
+              e = add_product(e, entry<V>(gain.Qux_rate[c], i), x[6 + i]);
             }
             d = d + e;
           }
@@ -240,19 +240,19 @@ inline void sweep_forth(Workspace<NC>& w, const Right* rights, int count) noexce
         }
       }
       for (int c = 0; c < U; ++c) store(w.eight_states[c % 3 * padded + s.first_row + c / 3], f[c]);
-      Vec y[12];
+      V y[12];
       for (int i = 0; i < 6; ++i) {
         const int block = i / 3 * 3;
-        Vec a = x[i];
-        for (int j = 0; j < 3; ++j) a = add_product(a, all(s.D[j].v[lane_of(i)]), x[6 + block + j]);
+        V a = x[i];
+        for (int j = 0; j < 3; ++j) a = add_product(a, all<V>(s.D[j].v[lane_of(i)]), x[6 + block + j]);
         y[i] = a;
-        Vec b = x[6 + i];
-        for (int c = 0; c < U; ++c) b = add_product(b, entry(s.B[c], i), f[c]);
+        V b = x[6 + i];
+        for (int c = 0; c < U; ++c) b = add_product(b, entry<V>(s.B[c], i), f[c]);
         y[6 + i] = b;
       }
       if (s.coupled) {
         for (int i = 0; i < 3; ++i) {
-          for (int j = 0; j < 3; ++j) y[6 + i] = add_product(y[6 + i], all(s.C[j].v[i]), x[3 + j]);
+          for (int j = 0; j < 3; ++j) y[6 + i] = add_product(y[6 + i], all<V>(s.C[j].v[i]), x[3 + j]);
         }
       }
       for (int i = 0; i < 12; ++i) x[i] = y[i];
@@ -260,23 +260,40 @@ inline void sweep_forth(Workspace<NC>& w, const Right* rights, int count) noexce
   }
 }
 
-/// Eight columns at once: sweeps with the constraints in the lanes. Of a free constraint the states that answer to
-/// su = c_i at its own stage; of one that is held those that answer to one newton off it, gradients included.
-template <bool kWithin, int NC>
-void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* out) noexcept {
+/// Columns of as many constraints as V has lanes: sweeps with the constraints in the lanes. Of a free constraint the
+/// states that answer to su = c_i at its own stage; of one that is held those that answer to one newton off it,
+/// gradients included.
+template <typename V, bool kWithin, int NC>
+void columns_in_lanes(Workspace<NC>& w, const int* ids, int count, double* const* out) noexcept {
   Right rights[8];
   take_rights<kWithin>(w, ids, count, rights);
-  sweep_back<kWithin>(w, rights, count);
-  sweep_forth<kWithin>(w, rights, count);
+  sweep_back<V, kWithin>(w, rights, count);
+  sweep_forth<V, kWithin>(w, rights, count);
   const int length = length_of_state(w);
   for (int at = 0; at < length; at += w.padded_rows) {
     for (int row = w.rows; row < w.padded_rows; ++row) store(w.eight_states[at + row], zeros());
   }
   for (int at = 0; at < length; at += 8) {
-    Vec t[8];
-    for (int i = 0; i < 8; ++i) t[i] = load(w.eight_states[at + i]);
-    transpose(t);
-    for (int j = 0; j < count; ++j) store(out[j] + at, t[j]);
+    const Lanes* rows = w.eight_states + at;
+    if constexpr (sizeof(V) == sizeof(Half)) {
+      Vec t[4];
+      for (int i = 0; i < 4; ++i) t[i] = low_halves(load(rows[i]), load(rows[4 + i]));
+      transpose_halves(t);
+      for (int j = 0; j < count; ++j) store(out[j] + at, t[j]);
+    } else {
+      Vec t[8];
+      for (int i = 0; i < 8; ++i) t[i] = load(rows[i]);
+      transpose(t);
+      for (int j = 0; j < count; ++j) store(out[j] + at, t[j]);
+    }
+  }
+}
+template <int NC>
+void columns_in_lanes(Workspace<NC>& w, const int* ids, int count, double* const* out) noexcept {
+  if (count <= 4) {
+    w.holds ? columns_in_lanes<Half, true>(w, ids, count, out) : columns_in_lanes<Half, false>(w, ids, count, out);
+  } else {
+    w.holds ? columns_in_lanes<Vec, true>(w, ids, count, out) : columns_in_lanes<Vec, false>(w, ids, count, out);
   }
 }
 
@@ -284,7 +301,6 @@ void eight_columns(Workspace<NC>& w, const int* ids, int count, double* const* o
 template <int NC>
 bool take_columns(Workspace<NC>& w, const int* ids, int count) noexcept {
   Columns& columns = columns_of(w);
-  const auto eight = w.holds ? &eight_columns<true, NC> : &eight_columns<false, NC>;
   int batch[8];
   double* out[8];
   int pending = 0;
@@ -298,11 +314,11 @@ bool take_columns(Workspace<NC>& w, const int* ids, int count) noexcept {
     columns.of[ids[i]] = columns.num;
     columns.constraint[columns.num++] = ids[i];
     if (pending == 8) {
-      eight(w, batch, pending, out);
+      columns_in_lanes(w, batch, pending, out);
       pending = 0;
     }
   }
-  if (pending > 0) eight(w, batch, pending, out);
+  if (pending > 0) columns_in_lanes(w, batch, pending, out);
   return room;
 }
 

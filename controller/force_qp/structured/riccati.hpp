@@ -5,8 +5,14 @@
 
 namespace stance::force_qp::structured::STANCE_ISA {
 
-inline Vec load(const Lanes& from) noexcept { return load(from.v); }
-inline void store(Lanes& to, const Vec& a) noexcept { store(to.v, a); }
+template <typename V = Vec>
+inline V load(const Lanes& from) noexcept {
+  return load<V>(from.v);
+}
+template <typename V>
+inline void store(Lanes& to, const V& a) noexcept {
+  store(to.v, a);
+}
 
 /// What a contact's held faces fix: which side of x and of y, which bound of z, 0 where none.
 struct Held {
@@ -21,7 +27,10 @@ struct Held {
 
 /// Lane of component i, 0 <= i < 6, of two 3-vectors.
 constexpr int lane_of(int i) noexcept { return i + i / 3; }
-inline Vec entry(const Lanes& a, int i) noexcept { return all(a.v[lane_of(i)]); }
+template <typename V = Vec>
+inline V entry(const Lanes& a, int i) noexcept {
+  return all<V>(a.v[lane_of(i)]);
+}
 
 // ---- Products with the model --------------------------------------------------------------------------------------
 

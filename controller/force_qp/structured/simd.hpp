@@ -3,7 +3,8 @@
 // path STANCE_ISA: everything lives in that namespace, so that no function compiled for one machine is ever linked
 // into another's path. For the same reason nothing here or in the kernels uses a template of the standard library.
 //
-// A Vec has eight lanes in two halves of four. Lanes 0-2 hold one 3-vector and lanes 4-6 another; 3 and 7 are spare.
+// A Vec has eight lanes in two halves of four. Lanes 0-2 hold one 3-vector and lanes 4-6 another; 3 and 7 are spare. A
+// Half has four lanes, and of the following load, store, all, +, -, * and the two sums with a product.
 //
 //   lane<J>(a)              lane J of a, in all lanes
 //   lane_of_halves<J>(a)    lane J of each half, in all lanes of that half
@@ -20,7 +21,10 @@
 
 namespace stance::force_qp::structured::STANCE_ISA {
 
-inline Vec zeros() noexcept { return all(0.0); }
+template <typename V = Vec>
+inline V zeros() noexcept {
+  return all<V>(0.0);
+}
 
 /// Sums of the lanes of a[0]..a[7], in one Vec; each as ((0+4)+(2+6)) + ((1+5)+(3+7)).
 inline Vec sums(const Vec (&a)[8]) noexcept {

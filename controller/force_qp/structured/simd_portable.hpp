@@ -6,40 +6,55 @@
 
 namespace stance::force_qp::structured::STANCE_ISA {
 
-struct Vec {
-  double v[8];
+template <int n>
+struct Numbers {
+  double v[n];
 };
+using Vec = Numbers<8>;
+using Half = Numbers<4>;
 
-template <typename F>
-inline Vec lanewise(F f) noexcept {
-  Vec r;
-  for (int i = 0; i < 8; ++i) r.v[i] = f(i);
+template <int n = 8, typename F>
+inline Numbers<n> lanewise(F f) noexcept {
+  Numbers<n> r;
+  for (int i = 0; i < n; ++i) r.v[i] = f(i);
   return r;
 }
 
-inline Vec load(const double* from) noexcept {
-  return lanewise([&](int i) { return from[i]; });
+template <typename V = Vec>
+inline V load(const double* from) noexcept {
+  V r;
+  for (double& x : r.v) x = *from++;
+  return r;
 }
-inline void store(double* to, const Vec& a) noexcept {
-  for (int i = 0; i < 8; ++i) to[i] = a.v[i];
+template <typename V = Vec>
+inline V all(double x) noexcept {
+  V r;
+  for (double& y : r.v) y = x;
+  return r;
 }
-inline Vec all(double x) noexcept {
-  return lanewise([&](int) { return x; });
+template <int n>
+inline void store(double* to, const Numbers<n>& a) noexcept {
+  for (int i = 0; i < n; ++i) to[i] = a.v[i];
 }
-inline Vec operator+(const Vec& a, const Vec& b) noexcept {
-  return lanewise([&](int i) { return a.v[i] + b.v[i]; });
+template <int n>
+inline Numbers<n> operator+(const Numbers<n>& a, const Numbers<n>& b) noexcept {
+  return lanewise<n>([&](int i) { return a.v[i] + b.v[i]; });
 }
-inline Vec operator-(const Vec& a, const Vec& b) noexcept {
-  return lanewise([&](int i) { return a.v[i] - b.v[i]; });
+template <int n>
+inline Numbers<n> operator-(const Numbers<n>& a, const Numbers<n>& b) noexcept {
+  return lanewise<n>([&](int i) { return a.v[i] - b.v[i]; });
 }
-inline Vec operator*(const Vec& a, const Vec& b) noexcept {
-  return lanewise([&](int i) { return a.v[i] * b.v[i]; });
+template <int n>
+inline Numbers<n> operator*(const Numbers<n>& a, const Numbers<n>& b) noexcept {
+  return lanewise<n>([&](int i) { return a.v[i] * b.v[i]; });
 }
-inline Vec add_product(const Vec& c, const Vec& a, const Vec& b) noexcept {
-  return lanewise([&](int i) { return std::fma(a.v[i], b.v[i], c.v[i]); });
+template <int n>
+inline Numbers<n> add_product(const Numbers<n>& c, const Numbers<n>& a, const Numbers<n>& b) noexcept {
+  return lanewise<n>([&](int i) { return std::fma(a.v[i], b.v[i], c.v[i]); });
 }
-inline Vec subtract_product(const Vec& c, const Vec& a, const Vec& b) noexcept {
-  return lanewise([&](int i) { return std::fma(-a.v[i], b.v[i], c.v[i]); });
+template <int n>
+inline Numbers<n> subtract_product(const Numbers<n>& c, const Numbers<n>& a, const Numbers<n>& b) noexcept {
+  return lanewise<n>([&](int i) { return std::fma(-a.v[i], b.v[i], c.v[i]); });
 }
 inline Vec operator/(const Vec& a, const Vec& b) noexcept {
   return lanewise([&](int i) { return a.v[i] / b.v[i]; });

@@ -366,7 +366,7 @@ const std::vector<Simd>& available_simd() {
 #ifdef STANCE_X86
     __builtin_cpu_init();
     if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) found.push_back(Simd::kAvx2);
-    if (__builtin_cpu_supports("avx512f")) found.push_back(Simd::kAvx512);
+    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl")) found.push_back(Simd::kAvx512);
 #endif
     return found;
   }();
