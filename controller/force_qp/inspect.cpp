@@ -17,7 +17,7 @@ template <typename X>
 bool all_zero(const Eigen::MatrixBase<X>& x) noexcept {
   return x.cwiseAbs().sum() == 0.0;
 }
-/// To the bit, for which the C library has the machine's widest compare.
+/// To the bit, for which the C library has the machine's widest compare; 0 and -0 differ, at the price of a factor.
 template <typename X>
 bool same(const X& x, const X& y) noexcept {
   return x.size() == y.size() &&
@@ -33,7 +33,7 @@ const StateMatrix kFixed = [] {
   return fixed;
 }();
 
-const StateMatrix kIdentity = StateMatrix::Identity();
+const StateMatrix kIdentity = StateMatrix::Identity();  // as numbers, for Eigen to vectorise what it is part of
 
 /// Times zero, what is not finite is a NaN: an A with this structure is finite, in D, E and C too.
 bool has_structure(const StateMatrix& A) noexcept { return all_zero((A - kIdentity).cwiseProduct(kFixed)); }

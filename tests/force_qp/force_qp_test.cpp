@@ -269,7 +269,7 @@ TEST_CASE("BadProblemsAreRefusedAndTheNextGoodOneIsSolvedAsByAFreshEngine") {
       {"infinite x0", QpStatus::kInvalidProblem, [](Problem& p) { p.x0(0) = kInfinity; }},
       {"x0 beyond all arithmetic", QpStatus::kInvalidProblem, [](Problem& p) { p.x0(0) = 1e306; }},
       {"NaN in A", QpStatus::kInvalidProblem, [](Problem& p) { p.stages[2].dynamics.A(0, 6) = kNan; }},
-      {"infinity in A", QpStatus::kInvalidProblem, [](Problem& p) { p.stages[1].dynamics.A(6, 4) = INFINITY; }},
+      {"infinity in A", QpStatus::kInvalidProblem, [](Problem& p) { p.stages[1].dynamics.A(6, 4) = kInfinity; }},
       {"NaN in B", QpStatus::kInvalidProblem, [](Problem& p) { p.stages[2].dynamics.B(7, 1) = kNan; }},
       {"NaN in g", QpStatus::kInvalidProblem, [](Problem& p) { p.stages[2].dynamics.g(11) = kNan; }},
       {"another structure", QpStatus::kInvalidProblem, [](Problem& p) { p.stages[2].dynamics.A(9, 0) = 0.1; }},

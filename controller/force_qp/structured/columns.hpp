@@ -5,7 +5,7 @@
 
 namespace stance::force_qp::structured::STANCE_ISA {
 
-/// Where the gradients begin in a state.
+/// Where the gradients begin in a state: the length of a vector of forces.
 template <int NC>
 inline int gradients_of_state(const Workspace<NC>& w) noexcept {
   return 3 * w.padded_rows;
@@ -77,7 +77,7 @@ struct Beginning {
 };
 
 /// The right-hand sides of `ids`, the latest first.
-template <bool kWithin, int NC>
+template <int NC>
 inline void take_rights(const Workspace<NC>& w, const int* ids, int count, Right (&rights)[8]) noexcept {
   for (int j = 0; j < count; ++j) {
     const int row = ids[j] / kFaces;
@@ -85,7 +85,7 @@ inline void take_rights(const Workspace<NC>& w, const int* ids, int count, Right
     r.stage = w.row_stage[row];
     r.slot = row - w.stages[r.stage].first_row;
     r.lane = j;
-    r.off = kWithin && is_held(w, ids[j]);
+    r.off = is_held(w, ids[j]);
     if (r.off) {
       way_off(ids[j], Held(w.held[row], w.fz_min[row]), w.friction, r.n);
     } else {
@@ -158,9 +158,9 @@ inline void sweep_back(Workspace<NC>& w, const Right* rights, int count) noexcep
       for (int c = 0; c < U; ++c) {
         V a = zeros<V>();
         for (int e = 0; e < U; ++e) a = add_product(a, entry<V>(gain.Quu_inverse[c / 6][e], c % 6), su[e]);
-        store(w.eight_feedforward[k * 3 * NC + c], a);
+        store(w.lane_feedforward[k * 3 * NC + c], a);
       }
-      for (int c = 0; c < U && kWithin; ++c) store(w.eight_right[k * 3 * NC + c], su[c]);
+      for (int c = 0; c < U && kWithin; ++c) store(w.lane_right[k * 3 * NC + c], su[c]);
       if (k == 0) return;
       V h[12];
       for (int i = 0; i < 6; ++i) {
@@ -189,7 +189,7 @@ inline void sweep_back(Workspace<NC>& w, const Right* rights, int count) noexcep
   }
 }
 
-/// The states, into eight_states.
+/// The states, into lane_states.
 template <typename V, bool kWithin, int NC>
 inline void sweep_forth(Workspace<NC>& w, const Right* rights, int count) noexcept {
   const Gain<NC>* gains = kWithin ? w.held_gains : w.gains;
@@ -210,7 +210,7 @@ inline void sweep_forth(Workspace<NC>& w, const Right* rights, int count) noexce
       constexpr int U = 3 * M;
       V f[U];
       for (int c = 0; c < U; ++c) {
-        V a = k <= last ? load<V>(w.eight_feedforward[k * 3 * NC + c]) : zeros<V>();
+        V a = k <= last ? load<V>(w.lane_feedforward[k * 3 * NC + c]) : zeros<V>();
         V b = zeros<V>();
         for (int i = 0; i < 6; ++i) {
           a = subtract_product(a, entry<V>(gain.K_pose[c], i), x[i]);
@@ -225,7 +225,7 @@ inline void sweep_forth(Workspace<NC>& w, const Right* rights, int count) noexce
           V d = zeros<V>();
           if (any != 0) {
             V e = zeros<V>();
-            if (k <= last) d = d - load<V>(w.eight_right[k * 3 * NC + c]);
+            if (k <= last) d = d - load<V>(w.lane_right[k * 3 * NC + c]);
             for (int j = 0; j < U; ++j) d = add_product(d, entry<V>(gain.Quu[c / 6][j], c % 6), f[j]);
             for (int i = 0; i < 6; ++i) {
               d = add_product(d, entry<V>(gain.Qux_pose[c], i), x[i]);
@@ -233,13 +233,13 @@ inline void sweep_forth(Workspace<NC>& w, const Right* rights, int count) noexce
             }
             d = d + e;
           }
-          store(w.eight_states[(3 + c % 3) * padded + s.first_row + c / 3], d);
+          store(w.lane_states[(3 + c % 3) * padded + s.first_row + c / 3], d);
         }
         if (any_begins) {
           for (int c = 0; c < U; ++c) f[c] = f[c] + begins.off[c];
         }
       }
-      for (int c = 0; c < U; ++c) store(w.eight_states[c % 3 * padded + s.first_row + c / 3], f[c]);
+      for (int c = 0; c < U; ++c) store(w.lane_states[c % 3 * padded + s.first_row + c / 3], f[c]);
       V y[12];
       for (int i = 0; i < 6; ++i) {
         const int block = i / 3 * 3;
@@ -260,24 +260,24 @@ inline void sweep_forth(Workspace<NC>& w, const Right* rights, int count) noexce
   }
 }
 
-/// Columns of as many constraints as V has lanes: sweeps with the constraints in the lanes. Of a free constraint the
-/// states that answer to su = c_i at its own stage; of one that is held those that answer to one newton off it,
-/// gradients included.
+/// Columns of at most as many constraints as V has lanes: sweeps with the constraints in the lanes. Of a free
+/// constraint the states that answer to su = c_i at its own stage; of one that is held those that answer to one newton
+/// off it, gradients included.
 template <typename V, bool kWithin, int NC>
 void columns_in_lanes(Workspace<NC>& w, const int* ids, int count, double* const* out) noexcept {
   Right rights[8];
-  take_rights<kWithin>(w, ids, count, rights);
+  take_rights(w, ids, count, rights);
   sweep_back<V, kWithin>(w, rights, count);
   sweep_forth<V, kWithin>(w, rights, count);
   const int length = length_of_state(w);
   for (int at = 0; at < length; at += w.padded_rows) {
-    for (int row = w.rows; row < w.padded_rows; ++row) store(w.eight_states[at + row], zeros());
+    for (int row = w.rows; row < w.padded_rows; ++row) store(w.lane_states[at + row], zeros());
   }
   for (int at = 0; at < length; at += 8) {
-    const Lanes* rows = w.eight_states + at;
+    const Lanes* rows = w.lane_states + at;
     if constexpr (sizeof(V) == sizeof(Half)) {
       Vec t[4];
-      for (int i = 0; i < 4; ++i) t[i] = low_halves(load(rows[i]), load(rows[4 + i]));
+      for (int i = 0; i < 4; ++i) t[i] = join(load<Half>(rows[i]), load<Half>(rows[4 + i]));
       transpose_halves(t);
       for (int j = 0; j < count; ++j) store(out[j] + at, t[j]);
     } else {
@@ -297,7 +297,7 @@ void columns_in_lanes(Workspace<NC>& w, const int* ids, int count, double* const
   }
 }
 
-/// Takes the columns of `ids` that there are not yet, eight at a time. False where there is no room for all.
+/// Takes the columns of `ids` that there are not yet, at most eight at a time. False where there is no room for all.
 template <int NC>
 bool take_columns(Workspace<NC>& w, const int* ids, int count) noexcept {
   Columns& columns = columns_of(w);

@@ -20,8 +20,6 @@ constexpr double kNoMultiplier = 1e-13;  // change of a multiplier that counts a
 constexpr double kNever = 1e300;         // a step that no multiplier stops
 constexpr double kExactlyActive = 1e-4;  // of the tolerance: an active constraint is met to this, or refined
 
-// ---- Active set ---------------------------------------------------------------------------------------------------
-
 /// The dual active set over the columns; see structured.hpp.
 template <int NC>
 class ActiveSet {
@@ -336,7 +334,7 @@ class ActiveSet {
       held_multipliers(h, w.friction, w.padded_rows, w.state + gradients() + row, y);
       for (int axis = 0; axis < 3; ++axis) {
         const int i = held_constraint(row, axis);
-        if (w.status[i] == kActive) w.last_multiplier[i] = y[axis];
+        if (w.status[i] == kActive && is_held(w, i)) w.last_multiplier[i] = y[axis];
       }
     }
   }

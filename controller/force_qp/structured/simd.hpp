@@ -4,10 +4,11 @@
 // into another's path. For the same reason nothing here or in the kernels uses a template of the standard library.
 //
 // A Vec has eight lanes in two halves of four. Lanes 0-2 hold one 3-vector and lanes 4-6 another; 3 and 7 are spare. A
-// Half has four lanes, and of the following load, store, all, +, -, * and the two sums with a product.
+// Half has four lanes, and only load, store, all, zeros, +, -, * and the two sums with a product.
 //
 //   lane<J>(a)              lane J of a, in all lanes
 //   lane_of_halves<J>(a)    lane J of each half, in all lanes of that half
+//   join(a, b)              two Halves
 //   low_halves(a, b)        (a's low half | b's low half); high_halves likewise
 //   transpose_halves(a)     a[i], lane j of each half <-> a[j], lane i
 //   where_larger(a, b, x, y)   lanes of x where a > b, else of y
@@ -21,6 +22,8 @@
 
 namespace stance::force_qp::structured::STANCE_ISA {
 
+inline Vec load(const double* from) noexcept { return load<Vec>(from); }
+inline Vec all(double x) noexcept { return all<Vec>(x); }
 template <typename V = Vec>
 inline V zeros() noexcept {
   return all<V>(0.0);

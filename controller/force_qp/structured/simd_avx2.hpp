@@ -2,51 +2,24 @@
 // Eight lanes as two registers of AVX2. See simd.hpp for the meaning.
 #include <immintrin.h>
 
-#include <cmath>
-
 #define STANCE_ISA avx2
+#include "controller/force_qp/structured/simd_half.hpp"
 
 namespace stance::force_qp::structured::STANCE_ISA {
 
-struct Half {
-  __m256d v;
-};
 struct Vec {
   __m256d low, high;
 };
 
-template <typename V = Vec>
-V load(const double* from) noexcept;
-template <>
-inline Half load<Half>(const double* from) noexcept {
-  return {_mm256_load_pd(from)};
-}
 template <>
 inline Vec load<Vec>(const double* from) noexcept {
   return {_mm256_load_pd(from), _mm256_load_pd(from + 4)};
-}
-template <typename V = Vec>
-V all(double x) noexcept;
-template <>
-inline Half all<Half>(double x) noexcept {
-  return {_mm256_set1_pd(x)};
 }
 template <>
 inline Vec all<Vec>(double x) noexcept {
   const __m256d r = _mm256_set1_pd(x);
   return {r, r};
 }
-inline void store(double* to, const Half& a) noexcept { _mm256_store_pd(to, a.v); }
-inline Half operator+(const Half& a, const Half& b) noexcept { return {_mm256_add_pd(a.v, b.v)}; }
-inline Half operator-(const Half& a, const Half& b) noexcept { return {_mm256_sub_pd(a.v, b.v)}; }
-inline Half operator*(const Half& a, const Half& b) noexcept { return {_mm256_mul_pd(a.v, b.v)}; }
-inline Half add_product(const Half& c, const Half& a, const Half& b) noexcept {
-  return {_mm256_fmadd_pd(a.v, b.v, c.v)};
-}
-inline Half subtract_product(const Half& c, const Half& a, const Half& b) noexcept {
-  return {_mm256_fnmadd_pd(a.v, b.v, c.v)};
-}
-
 inline void store(double* to, const Vec& a) noexcept {
   _mm256_store_pd(to, a.low);
   _mm256_store_pd(to + 4, a.high);
@@ -90,6 +63,7 @@ inline Vec lane_of_halves(const Vec& a) noexcept {
   return {_mm256_permute4x64_pd(a.low, J * 0x55), _mm256_permute4x64_pd(a.high, J * 0x55)};
 }
 inline Vec swap_halves(const Vec& a) noexcept { return {a.high, a.low}; }
+inline Vec join(const Half& a, const Half& b) noexcept { return {a.v, b.v}; }
 inline Vec low_halves(const Vec& a, const Vec& b) noexcept { return {a.low, b.low}; }
 inline Vec high_halves(const Vec& a, const Vec& b) noexcept { return {a.high, b.high}; }
 inline void transpose_4x4(__m256d& a, __m256d& b, __m256d& c, __m256d& d) noexcept {

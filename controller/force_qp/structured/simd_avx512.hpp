@@ -2,50 +2,23 @@
 // Eight lanes as one register of AVX-512. See simd.hpp for the meaning.
 #include <immintrin.h>
 
-#include <cmath>
-
 #define STANCE_ISA avx512
+#include "controller/force_qp/structured/simd_half.hpp"
 
 namespace stance::force_qp::structured::STANCE_ISA {
 
-struct Half {
-  __m256d v;
-};
 struct Vec {
   __m512d v;
 };
 
-template <typename V = Vec>
-V load(const double* from) noexcept;
-template <>
-inline Half load<Half>(const double* from) noexcept {
-  return {_mm256_load_pd(from)};
-}
 template <>
 inline Vec load<Vec>(const double* from) noexcept {
   return {_mm512_load_pd(from)};
-}
-template <typename V = Vec>
-V all(double x) noexcept;
-template <>
-inline Half all<Half>(double x) noexcept {
-  return {_mm256_set1_pd(x)};
 }
 template <>
 inline Vec all<Vec>(double x) noexcept {
   return {_mm512_set1_pd(x)};
 }
-inline void store(double* to, const Half& a) noexcept { _mm256_store_pd(to, a.v); }
-inline Half operator+(const Half& a, const Half& b) noexcept { return {_mm256_add_pd(a.v, b.v)}; }
-inline Half operator-(const Half& a, const Half& b) noexcept { return {_mm256_sub_pd(a.v, b.v)}; }
-inline Half operator*(const Half& a, const Half& b) noexcept { return {_mm256_mul_pd(a.v, b.v)}; }
-inline Half add_product(const Half& c, const Half& a, const Half& b) noexcept {
-  return {_mm256_fmadd_pd(a.v, b.v, c.v)};
-}
-inline Half subtract_product(const Half& c, const Half& a, const Half& b) noexcept {
-  return {_mm256_fnmadd_pd(a.v, b.v, c.v)};
-}
-
 inline void store(double* to, const Vec& a) noexcept { _mm512_store_pd(to, a.v); }
 inline Vec operator+(const Vec& a, const Vec& b) noexcept { return {_mm512_add_pd(a.v, b.v)}; }
 inline Vec operator-(const Vec& a, const Vec& b) noexcept { return {_mm512_sub_pd(a.v, b.v)}; }
@@ -69,6 +42,9 @@ inline Vec lane_of_halves(const Vec& a) noexcept {
   return {_mm512_permutex_pd(a.v, J * 0x55)};
 }
 inline Vec swap_halves(const Vec& a) noexcept { return {_mm512_shuffle_f64x2(a.v, a.v, 0x4e)}; }
+inline Vec join(const Half& a, const Half& b) noexcept {
+  return {_mm512_insertf64x4(_mm512_castpd256_pd512(a.v), b.v, 1)};
+}
 inline Vec low_halves(const Vec& a, const Vec& b) noexcept { return {_mm512_shuffle_f64x2(a.v, b.v, 0x44)}; }
 inline Vec high_halves(const Vec& a, const Vec& b) noexcept { return {_mm512_shuffle_f64x2(a.v, b.v, 0xee)}; }
 inline void transpose_halves(Vec (&a)[4]) noexcept {

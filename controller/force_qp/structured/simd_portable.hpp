@@ -7,53 +7,53 @@
 namespace stance::force_qp::structured::STANCE_ISA {
 
 template <int n>
-struct Numbers {
+struct LanesOf {
   double v[n];
 };
-using Vec = Numbers<8>;
-using Half = Numbers<4>;
+using Vec = LanesOf<8>;
+using Half = LanesOf<4>;
 
 template <int n = 8, typename F>
-inline Numbers<n> lanewise(F f) noexcept {
-  Numbers<n> r;
+inline LanesOf<n> lanewise(F f) noexcept {
+  LanesOf<n> r;
   for (int i = 0; i < n; ++i) r.v[i] = f(i);
   return r;
 }
 
-template <typename V = Vec>
+template <typename V>
 inline V load(const double* from) noexcept {
   V r;
   for (double& x : r.v) x = *from++;
   return r;
 }
-template <typename V = Vec>
+template <typename V>
 inline V all(double x) noexcept {
   V r;
   for (double& y : r.v) y = x;
   return r;
 }
 template <int n>
-inline void store(double* to, const Numbers<n>& a) noexcept {
+inline void store(double* to, const LanesOf<n>& a) noexcept {
   for (int i = 0; i < n; ++i) to[i] = a.v[i];
 }
 template <int n>
-inline Numbers<n> operator+(const Numbers<n>& a, const Numbers<n>& b) noexcept {
+inline LanesOf<n> operator+(const LanesOf<n>& a, const LanesOf<n>& b) noexcept {
   return lanewise<n>([&](int i) { return a.v[i] + b.v[i]; });
 }
 template <int n>
-inline Numbers<n> operator-(const Numbers<n>& a, const Numbers<n>& b) noexcept {
+inline LanesOf<n> operator-(const LanesOf<n>& a, const LanesOf<n>& b) noexcept {
   return lanewise<n>([&](int i) { return a.v[i] - b.v[i]; });
 }
 template <int n>
-inline Numbers<n> operator*(const Numbers<n>& a, const Numbers<n>& b) noexcept {
+inline LanesOf<n> operator*(const LanesOf<n>& a, const LanesOf<n>& b) noexcept {
   return lanewise<n>([&](int i) { return a.v[i] * b.v[i]; });
 }
 template <int n>
-inline Numbers<n> add_product(const Numbers<n>& c, const Numbers<n>& a, const Numbers<n>& b) noexcept {
+inline LanesOf<n> add_product(const LanesOf<n>& c, const LanesOf<n>& a, const LanesOf<n>& b) noexcept {
   return lanewise<n>([&](int i) { return std::fma(a.v[i], b.v[i], c.v[i]); });
 }
 template <int n>
-inline Numbers<n> subtract_product(const Numbers<n>& c, const Numbers<n>& a, const Numbers<n>& b) noexcept {
+inline LanesOf<n> subtract_product(const LanesOf<n>& c, const LanesOf<n>& a, const LanesOf<n>& b) noexcept {
   return lanewise<n>([&](int i) { return std::fma(-a.v[i], b.v[i], c.v[i]); });
 }
 inline Vec operator/(const Vec& a, const Vec& b) noexcept {
@@ -70,7 +70,7 @@ inline Vec magnitude(const Vec& a) noexcept {
 }
 template <int J>
 inline Vec lane(const Vec& a) noexcept {
-  return all(a.v[J]);
+  return all<Vec>(a.v[J]);
 }
 template <int J>
 inline Vec lane_of_halves(const Vec& a) noexcept {
@@ -78,6 +78,9 @@ inline Vec lane_of_halves(const Vec& a) noexcept {
 }
 inline Vec swap_halves(const Vec& a) noexcept {
   return lanewise([&](int i) { return a.v[i ^ 4]; });
+}
+inline Vec join(const Half& a, const Half& b) noexcept {
+  return lanewise([&](int i) { return i < 4 ? a.v[i] : b.v[i - 4]; });
 }
 inline Vec low_halves(const Vec& a, const Vec& b) noexcept {
   return lanewise([&](int i) { return i < 4 ? a.v[i] : b.v[i - 4]; });

@@ -2,7 +2,6 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <cmath>
 
 #include "controller/force_qp/structured/paths.hpp"
 
@@ -69,9 +68,9 @@ class Solver final : public StructuredSolver {
         held_costs_(num_stages(), Cost{}),
         states_(2 * num_stages(), Lanes{}),
         feedforward_(num_stages() * Stage<NC>::kPairs, Lanes{}),
-        eight_states_(6 * max_rows_, Lanes{}),
-        eight_feedforward_(num_stages() * 3 * NC, Lanes{}),
-        eight_right_(num_stages() * 3 * NC, Lanes{}),
+        lane_states_(6 * max_rows_, Lanes{}),
+        lane_feedforward_(num_stages() * 3 * NC, Lanes{}),
+        lane_right_(num_stages() * 3 * NC, Lanes{}),
         row_numbers_(3 * max_rows_),
         state_numbers_(30 * max_rows_),
         multipliers_(2 * kFaces * max_rows_),
@@ -115,9 +114,9 @@ class Solver final : public StructuredSolver {
                       columns_.data()};
     w.held_columns = {static_cast<int>(max_held_columns_), 0, w.free_columns.of + kFaces * max_rows_,
                       w.free_columns.constraint + max_columns_, held_columns_.data()};
-    w.eight_states = eight_states_.data();
-    w.eight_feedforward = eight_feedforward_.data();
-    w.eight_right = eight_right_.data();
+    w.lane_states = lane_states_.data();
+    w.lane_feedforward = lane_feedforward_.data();
+    w.lane_right = lane_right_.data();
     w.max_active = static_cast<int>(max_active_);
     w.constraint = set_constraint_.data();
     w.multiplier = set_numbers_.data();
@@ -333,7 +332,7 @@ class Solver final : public StructuredSolver {
   std::vector<Stage<NC>> stages_;
   std::vector<Gain<NC>> gains_, held_gains_;
   std::vector<Cost> held_costs_;
-  std::vector<Lanes> states_, feedforward_, eight_states_, eight_feedforward_, eight_right_;
+  std::vector<Lanes> states_, feedforward_, lane_states_, lane_feedforward_, lane_right_;
   Numbers row_numbers_, state_numbers_, multipliers_, columns_, held_columns_, set_numbers_, L_inverse_;
   std::vector<const double*> columns_of_set_;
   std::vector<int> row_stage_, constraint_column_, column_constraint_, candidates_, guesses_;
@@ -365,8 +364,9 @@ const std::vector<Simd>& available_simd() {
     std::vector<Simd> found = {Simd::kPortable};
 #ifdef STANCE_X86
     __builtin_cpu_init();
-    if (__builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma")) found.push_back(Simd::kAvx2);
-    if (__builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl")) found.push_back(Simd::kAvx512);
+    const bool fma = __builtin_cpu_supports("fma") != 0;
+    if (fma && __builtin_cpu_supports("avx2")) found.push_back(Simd::kAvx2);
+    if (fma && __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512vl")) found.push_back(Simd::kAvx512);
 #endif
     return found;
   }();

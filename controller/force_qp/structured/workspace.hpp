@@ -79,8 +79,8 @@ struct SignedFactor {
   int size;
   double* L_inverse;
   double* sign;   ///< S
-  double* right;  ///< of what is solved for
-  double* half;
+  double* right;  ///< M direction = right
+  double* half;   ///< S L^-1 right
   double* direction;
 };
 
@@ -125,13 +125,13 @@ struct Workspace {
   Lanes* feedforward;  ///< num_stages x pairs
   // Columns, of the factor and of that within held faces
   Columns free_columns, held_columns;
-  int ahead;            ///< constraints before this one have their columns
-  Lanes* eight_states;  ///< 6 padded_rows, right-hand sides in the lanes
-  Lanes* eight_feedforward;
-  Lanes* eight_right;
+  int ahead;           ///< constraints before this one have their columns
+  Lanes* lane_states;  ///< 6 padded_rows, right-hand sides in the lanes; of four, in the first
+  Lanes* lane_feedforward;
+  Lanes* lane_right;
   // The active set, or what has changed of the held one
   int max_active;
-  SignedFactor M;          ///< sign -1 where a constraint is released
+  SignedFactor M;          ///< a pivot for each constraint of the set, of sign -1 where it is released
   Constraint* constraint;  ///< max_active
   double* multiplier;      ///< or by how far a released one is off its face, N
   double* excess;          ///< c_i u0 - b_i

@@ -7,7 +7,7 @@ namespace {
 
 using namespace force_qp;
 
-/// The solver alone, as the peers are: no inspection, no certificate.
+/// The solver alone, as the peers are: no inspection, no check.
 template <Simd simd>
 class Structured final : public Engine {
  public:
@@ -30,7 +30,7 @@ class Structured final : public Engine {
   std::unique_ptr<StructuredSolver> solver_;
 };
 
-/// An engine as the controller uses it: inspection, certificate and all.
+/// An engine as the controller uses it: inspection, check and all.
 template <QpEngine which, bool alone = false>
 class Certified final : public Engine {
  public:
