@@ -288,19 +288,12 @@ void columns_in_lanes(Workspace<NC>& w, const int* ids, int count, double* const
     }
   }
 }
-template <int NC>
-void columns_in_lanes(Workspace<NC>& w, const int* ids, int count, double* const* out) noexcept {
-  if (count <= 4) {
-    w.holds ? columns_in_lanes<Half, true>(w, ids, count, out) : columns_in_lanes<Half, false>(w, ids, count, out);
-  } else {
-    w.holds ? columns_in_lanes<Vec, true>(w, ids, count, out) : columns_in_lanes<Vec, false>(w, ids, count, out);
-  }
-}
-
-/// Takes the columns of `ids` that there are not yet, at most eight at a time. False where there is no room for all.
+/// Takes the columns of `ids` that there are not yet, four or eight at a time. False where there is no room for all.
 template <int NC>
 bool take_columns(Workspace<NC>& w, const int* ids, int count) noexcept {
   Columns& columns = columns_of(w);
+  const int lanes = w.holds ? 4 : 8;
+  const auto take = w.holds ? &columns_in_lanes<Half, true, NC> : &columns_in_lanes<Vec, false, NC>;
   int batch[8];
   double* out[8];
   int pending = 0;
@@ -313,12 +306,12 @@ bool take_columns(Workspace<NC>& w, const int* ids, int count) noexcept {
     out[pending++] = columns.values + static_cast<std::int64_t>(columns.num) * length_of_state(w);
     columns.of[ids[i]] = columns.num;
     columns.constraint[columns.num++] = ids[i];
-    if (pending == 8) {
-      columns_in_lanes(w, batch, pending, out);
+    if (pending == lanes) {
+      take(w, batch, pending, out);
       pending = 0;
     }
   }
-  if (pending > 0) columns_in_lanes(w, batch, pending, out);
+  if (pending > 0) take(w, batch, pending, out);
   return room;
 }
 

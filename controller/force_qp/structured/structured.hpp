@@ -37,8 +37,9 @@
 //     released  how far it is off its face:    f = tau at its own stage, c_r tau = 1, all other  -tau'd, its
 //               c_r f = b_r - u                faces of G still: su = -Quu tau, p -= Qux'tau     multiplier: 0
 //
-//   Eight columns go together, or four where no more are wanted, in the lanes. They live as long as their factor: where
-//   the matrices stay from solve to solve, eight more of the free one, which has no G, are taken ahead in each.
+//   Eight columns go together in the lanes; four of a G, where seldom more are wanted at a time. They live as long as
+//   their factor: where the matrices stay from solve to solve, eight more of the free one, which has no G, are taken
+//   ahead in each.
 //   M is symmetric, positive on what is added and negative on what is released: M = L S L', S = diag(+-1). Only L^-1 is
 //   kept. Appending e adds a row: with g = N v_e and r = M^-1 g it is (-r', 1) / sqrt(|n_e v_e - g'r|). Dropping j
 //   rotates rows until column j is zero but for one row, which goes: Givens rotations between equal signs, hyperbolic
