@@ -1,6 +1,4 @@
 // The structured engine where it differs from the others: any model of the structure, any schedule, every path.
-#include "controller/force_qp/structured_engine.hpp"
-
 #include <Eigen/QR>
 #include <algorithm>
 #include <catch2/catch_test_macros.hpp>
@@ -8,6 +6,7 @@
 #include <random>
 
 #include "controller/force_qp/kkt.hpp"
+#include "controller/force_qp/structured_engine.hpp"
 #include "tests/force_qp/problems.hpp"
 #include "tests/force_qp/reference_solver.hpp"
 
